@@ -1,0 +1,35 @@
+//! The one error type of the library.
+
+/// Everything that can go wrong before or after a solve. A solve that does not converge is not an error but a result.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The user's input is wrong: says what, where, and what to do. Exit code 2.
+    #[error("{0}")]
+    Input(String),
+    /// A file could not be read or written. Exit code 2.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// Something inside failed that no input should cause.
+    #[error("internal error: {0}")]
+    Internal(String),
+}
+
+/// Shorthand used throughout the library.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An input error with a message.
+    pub fn input(message: impl Into<String>) -> Self {
+        Error::Input(message.into())
+    }
+
+    /// An I/O error at a path.
+    pub fn io(path: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
+        Error::Io { path: path.as_ref().display().to_string(), source }
+    }
+}

@@ -1,0 +1,2 @@
+//! The `warpgait` program.
+fn main() {}
