@@ -1,0 +1,420 @@
+//! The scenario: everything a user asks for, as plain data (`scenarios/*.toml`, schema 1).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A whole scenario file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Always 1.
+    pub schema: u32,
+    /// Which space the variables live in.
+    #[serde(default)]
+    pub formulation: Formulation,
+    /// T, s.
+    #[serde(default = "default_horizon")]
+    pub horizon: f64,
+    /// Δt, s.
+    #[serde(default = "default_time_step")]
+    pub time_step: f64,
+    /// Which robot.
+    #[serde(default)]
+    pub robot: RobotSpec,
+    /// Which ground.
+    pub terrain: TerrainSpec,
+    /// Where it starts.
+    pub start: StartSpec,
+    /// Where it goes.
+    pub goal: GoalSpec,
+    /// Order and timing of the feet.
+    #[serde(default)]
+    pub gait: GaitSpec,
+    /// How the motion should be.
+    #[serde(default)]
+    pub motion: MotionSpec,
+    /// Friction and footholds.
+    #[serde(default)]
+    pub contact: ContactSpec,
+    /// Which form of the laws of motion.
+    #[serde(default)]
+    pub physics: PhysicsSpec,
+    /// How φ is found.
+    #[serde(default)]
+    pub map: MapSpec,
+    /// How the NLP is solved.
+    #[serde(default)]
+    pub solver: SolverSpec,
+}
+
+fn default_horizon() -> f64 {
+    10.0
+}
+fn default_time_step() -> f64 {
+    0.05
+}
+
+/// The space of the variables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Formulation {
+    /// Eq. 7–13: variables in F, pushed forward by φ.
+    #[default]
+    Warped,
+    /// Eq. 1–5: variables in ambient space (the baseline).
+    Direct,
+}
+
+/// `[robot]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RobotSpec {
+    /// Name of a shipped robot.
+    pub name: String,
+    /// A robot file instead, relative to the scenario.
+    pub file: Option<String>,
+    /// Feet that may pull on the ground.
+    pub adhesive_feet: Vec<String>,
+}
+
+impl Default for RobotSpec {
+    fn default() -> Self {
+        Self { name: "anymal_b".into(), file: None, adhesive_feet: Vec::new() }
+    }
+}
+
+/// `level` of a terrain of the paper.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Level {
+    /// Gentle.
+    Easy,
+    /// As in the paper, as far as its figures show.
+    #[default]
+    Medium,
+    /// Steep.
+    Hard,
+}
+
+/// Which terrain, by `kind`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TerrainKind {
+    /// h = 0.
+    Flat,
+    /// A sin(kx) sin(ky).
+    Rippled,
+    /// A smooth cone.
+    Conic,
+    /// A Gaussian hill.
+    Hilly,
+    /// A round pit with a smooth edge.
+    Pit,
+    /// An expression in x and y.
+    Formula,
+    /// An image or array.
+    Heightmap,
+    /// A triangle mesh seen from above.
+    Mesh,
+}
+
+/// `[terrain]`. Which keys are allowed depends on `kind`; see the scenario format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TerrainSpec {
+    /// Kind of terrain.
+    pub kind: TerrainKind,
+    /// Parameters by name, for the four of the paper.
+    pub level: Option<Level>,
+    /// rippled: A, m.
+    pub amplitude: Option<f64>,
+    /// rippled: 2π/k, m.
+    pub wavelength: Option<f64>,
+    /// conic: s.
+    pub slope: Option<f64>,
+    /// conic, pit: ρ0, m.
+    pub radius: Option<f64>,
+    /// conic: ε, m.
+    pub tip: Option<f64>,
+    /// conic: β, m.
+    pub foot: Option<f64>,
+    /// hilly: H, m.
+    pub height: Option<f64>,
+    /// hilly: w, m.
+    pub width: Option<f64>,
+    /// pit: D, m.
+    pub depth: Option<f64>,
+    /// pit: δ, m.
+    pub edge: Option<f64>,
+    /// formula: h(x, y) in m.
+    pub expression: Option<String>,
+    /// heightmap, mesh: file, relative to the scenario.
+    pub file: Option<String>,
+    /// heightmap: m a pixel; others: spacing of the grid that h is sampled on, m.
+    pub spacing: Option<f64>,
+    /// heightmap: m from black to white (image) or a factor (.npy).
+    pub height_scale: Option<f64>,
+    /// heightmap, mesh: length over which h is smoothed, m.
+    pub smoothing: Option<f64>,
+    /// heightmap: x, y of the centre, m.
+    pub origin: Option<[f64; 2]>,
+    /// x_min, x_max, y_min, y_max, m.
+    pub extent: Option<[f64; 4]>,
+}
+
+/// `[start]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StartSpec {
+    /// x, y of the base, m.
+    pub position: [f64; 2],
+    /// Heading, rad; default: towards the goal.
+    pub yaw: Option<f64>,
+}
+
+/// `[goal]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GoalSpec {
+    /// x, y of the base at the end, m; a hard constraint.
+    pub position: [f64; 2],
+    /// Heading at the end, rad; a hard constraint when given.
+    pub yaw: Option<f64>,
+}
+
+/// `gait.kind`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GaitKind {
+    /// One foot at a time: LH, LF, RH, RF.
+    #[default]
+    Walk,
+    /// Diagonal pairs.
+    Trot,
+    /// Lateral pairs.
+    Pace,
+    /// Front and hind pairs.
+    Bound,
+    /// No steps.
+    Stand,
+    /// Phase tables by foot.
+    Custom,
+}
+
+/// `[gait]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GaitSpec {
+    /// Which pattern.
+    pub kind: GaitKind,
+    /// Length of a cycle, s.
+    pub cycle: f64,
+    /// Share of the cycle that a foot stands; default by kind: walk 0.75, others 0.6.
+    pub duty: Option<f64>,
+    /// Make the phase durations variables.
+    pub optimize_durations: bool,
+    /// Least and greatest phase duration, s.
+    pub duration_bounds: [f64; 2],
+    /// custom: by foot, alternating stance and swing durations in s, stance first, their sum the horizon.
+    pub phases: Option<Vec<Vec<f64>>>,
+}
+
+impl Default for GaitSpec {
+    fn default() -> Self {
+        Self {
+            kind: GaitKind::Walk,
+            cycle: 1.0,
+            duty: None,
+            optimize_durations: false,
+            duration_bounds: [0.1, 1.0],
+            phases: None,
+        }
+    }
+}
+
+/// `[motion]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionSpec {
+    /// Least apex of a swing over the ground, m.
+    pub swing_clearance: f64,
+    /// Least distance of the torso's underside from the ground, m.
+    pub base_clearance: f64,
+    /// Greatest normal force of a foot, of m g.
+    pub force_limit: f64,
+    /// Greatest pull of an adhesive foot, of m g.
+    pub pull_limit: f64,
+    /// Weights of base acceleration and force rate.
+    pub smoothness: [f64; 2],
+}
+
+impl Default for MotionSpec {
+    fn default() -> Self {
+        Self {
+            swing_clearance: 0.06,
+            base_clearance: 0.10,
+            force_limit: 2.0,
+            pull_limit: 1.2,
+            smoothness: [1e-4, 1e-4],
+        }
+    }
+}
+
+/// Which friction cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cone {
+    /// Eq. 5 with the true terrain normal.
+    #[default]
+    Exact,
+    /// Eq. 9.
+    Conformal,
+}
+
+/// `[contact]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactSpec {
+    /// ν.
+    pub friction: f64,
+    /// Which cone.
+    pub cone: Cone,
+    /// Greatest slope |∇h| of a foothold; default: none.
+    pub max_slope: Option<f64>,
+}
+
+impl Default for ContactSpec {
+    fn default() -> Self {
+        Self { friction: 0.75, cone: Cone::Exact, max_slope: None }
+    }
+}
+
+/// Which form of the laws of motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// Position-based, centred.
+    #[default]
+    Pcdm,
+    /// Position-based, backward: Eq. 11.
+    PcdmBackward,
+    /// Eq. 2.
+    NewtonEuler,
+}
+
+/// `[physics]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhysicsSpec {
+    /// The law.
+    pub law: Law,
+}
+
+/// How the map is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MapMethod {
+    /// The scale-invariant energy ¼(‖J‖²/det^⅔ − 3).
+    #[default]
+    Mips,
+    /// Algorithm 1.
+    AcapLocalGlobal,
+    /// μ > 0, Gauss–Newton.
+    AcapNewton,
+    /// Laplace.
+    Dirichlet,
+    /// As rigid as possible.
+    Arap,
+    /// (x, y, z + h).
+    Shear,
+}
+
+/// `[map]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MapSpec {
+    /// The method.
+    pub method: MapMethod,
+    /// Cells along x, y, z.
+    pub cells: [usize; 3],
+    /// Height of the box, m.
+    pub thickness: f64,
+}
+
+impl Default for MapSpec {
+    fn default() -> Self {
+        Self { method: MapMethod::Mips, cells: [48, 48, 16], thickness: 2.5 }
+    }
+}
+
+/// Which Hessian Ipopt gets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hessian {
+    /// L-BFGS.
+    #[default]
+    LimitedMemory,
+    /// Analytic second derivatives.
+    Exact,
+}
+
+/// How far to go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// Stop at the first feasible point, without a cost.
+    Feasible,
+    /// With the cost, stop when feasible and no longer getting better.
+    #[default]
+    Smooth,
+    /// To the optimum.
+    Optimal,
+}
+
+/// `continuation`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Continuation {
+    /// `"auto"` or `"off"`.
+    Mode(ContinuationMode),
+    /// A number of steps.
+    Steps(u32),
+}
+
+/// `"auto"` or `"off"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContinuationMode {
+    /// When the plain solve fails.
+    Auto,
+    /// Never.
+    Off,
+}
+
+/// `[solver]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverSpec {
+    /// Iterations, those of a continuation included.
+    pub max_iterations: usize,
+    /// Largest violation, in the units of the NLP.
+    pub tolerance: f64,
+    /// Whether to grow the terrain out of the plane when the plain solve fails.
+    pub continuation: Continuation,
+    /// Which Hessian.
+    pub hessian: Hessian,
+    /// How far to go.
+    pub effort: Effort,
+}
+
+impl Default for SolverSpec {
+    fn default() -> Self {
+        Self {
+            max_iterations: 200,
+            tolerance: 1e-4,
+            continuation: Continuation::Mode(ContinuationMode::Auto),
+            hessian: Hessian::LimitedMemory,
+            effort: Effort::Smooth,
+        }
+    }
+}
