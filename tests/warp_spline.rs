@@ -245,3 +245,20 @@ fn stored_maps_come_back_and_broken_ones_are_refused() {
             .contains("not finite")
     );
 }
+
+#[test]
+fn the_shear_lies_on_the_ground() {
+    let height = |x: f64, y: f64| 0.15 * (2.6 * x).sin() * (2.6 * y).sin() + 0.1 * x;
+    let map = WarpMap::shear_of([-3.0, 3.0, -2.0, 2.0], &MapSpec::default(), height).unwrap();
+    for x in points(&map, 0.0, 300) {
+        let p = map.position(x);
+        assert!((p[0] - x[0]).abs() < 1e-12 && (p[1] - x[1]).abs() < 1e-12);
+        assert!(
+            (p[2] - x[2] - height(x[0], x[1])).abs() < 1e-4,
+            "{x:?} {p:?}"
+        );
+    }
+    let error = WarpMap::shear_of([-3.0, 3.0, -2.0, 2.0], &MapSpec::default(), |x, _| x.sqrt())
+        .unwrap_err();
+    assert!(error.to_string().contains("finite height"), "{error}");
+}

@@ -1,7 +1,10 @@
 //! The warp φ: F → A, a tri-cubic B-spline whose bottom face is the terrain.
 
+mod axis;
 mod basis;
+mod bottom;
 mod inverse;
+mod shear;
 mod spline;
 
 pub use spline::{Order, WarpMap};

@@ -80,6 +80,11 @@ impl WarpMap {
         &self.control_points
     }
 
+    /// ψ, to be changed in place.
+    pub(super) fn control_points_mut(&mut self) -> &mut [[f64; 3]] {
+        &mut self.control_points
+    }
+
     /// φ(x̄), m. Defined everywhere.
     pub fn position(&self, x: [f64; 3]) -> [f64; 3] {
         self.derivatives::<1>(x).position
