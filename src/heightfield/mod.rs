@@ -50,18 +50,13 @@ impl Grid {
     /// For a degenerate or non-finite rectangle or spacing, and for more than [`MAX_SAMPLES`] nodes.
     pub fn fitted(extent: [f64; 4], spacing: f64) -> Result<Self> {
         let [x_min, x_max, y_min, y_max] = extent;
-        if !extent.iter().all(|v| v.is_finite() && v.abs() <= 1e6)
-            || x_max <= x_min
-            || y_max <= y_min
-        {
+        if !extent.iter().all(|v| v.is_finite() && v.abs() <= 1e6) || x_max <= x_min || y_max <= y_min {
             return Err(Error::input(format!(
                 "terrain extent {extent:?} is not a rectangle: give x_min < x_max and y_min < y_max in metres"
             )));
         }
         if !(spacing.is_finite() && spacing > 0.0) {
-            return Err(Error::input(format!(
-                "grid spacing {spacing} must be a positive length in metres"
-            )));
+            return Err(Error::input(format!("grid spacing {spacing} must be a positive length in metres")));
         }
         let [width, depth] = [x_max - x_min, y_max - y_min];
         // A hair less, lest 6 m / 0.01 m become 601 intervals by rounding.
@@ -82,12 +77,7 @@ impl Grid {
                 "terrain extent {extent:?} is too narrow for its distance from the origin"
             )));
         }
-        Ok(Self {
-            origin: [x_min, y_min],
-            spacing,
-            columns,
-            rows,
-        })
+        Ok(Self { origin: [x_min, y_min], spacing, columns, rows })
     }
 
     /// x of a column, m.
@@ -112,12 +102,7 @@ impl Grid {
 
     /// x_min, x_max, y_min, y_max, m.
     pub fn extent(&self) -> [f64; 4] {
-        [
-            self.x(0),
-            self.x(self.columns - 1),
-            self.y(0),
-            self.y(self.rows - 1),
-        ]
+        [self.x(0), self.x(self.columns - 1), self.y(0), self.y(self.rows - 1)]
     }
 
     /// Values of a function of x, y at the nodes, (rows, columns) row by row. Stops at the first error.
@@ -170,28 +155,15 @@ impl Heightfield {
             )));
         }
         if samples.len() != columns * rows {
-            return Err(Error::input(format!(
-                "{} heights for a grid of {columns} x {rows}",
-                samples.len()
-            )));
+            return Err(Error::input(format!("{} heights for a grid of {columns} x {rows}", samples.len())));
         }
-        if !spacing.iter().all(|s| s.is_finite() && *s > 0.0)
-            || !origin.iter().all(|o| o.is_finite())
-        {
+        if !spacing.iter().all(|s| s.is_finite() && *s > 0.0) || !origin.iter().all(|o| o.is_finite()) {
             return Err(Error::input(format!(
                 "a height grid at {origin:?} with spacing {spacing:?} m: the origin must be finite, the spacing positive"
             )));
         }
-        let grid = Grid {
-            origin,
-            spacing,
-            columns,
-            rows,
-        };
-        if let Some(i) = samples
-            .iter()
-            .position(|h| h.is_nan() || h.abs() > MAX_HEIGHT)
-        {
+        let grid = Grid { origin, spacing, columns, rows };
+        if let Some(i) = samples.iter().position(|h| h.is_nan() || h.abs() > MAX_HEIGHT) {
             let (x, y) = (grid.x(i % columns), grid.y(i / columns));
             return Err(Error::input(format!(
                 "the height at x = {x:.4}, y = {y:.4} is {}: heights must be finite and within ±{MAX_HEIGHT} m",
@@ -199,15 +171,11 @@ impl Heightfield {
             )));
         }
         let along_y = Interpolation::new(rows).solve(columns, samples);
-        let along_x =
-            Interpolation::new(columns).solve(rows + 2, &transposed(&along_y, rows + 2, columns));
+        let along_x = Interpolation::new(columns).solve(rows + 2, &transposed(&along_y, rows + 2, columns));
         Ok(Self {
             grid,
             samples: samples.to_vec(),
-            axes: [
-                Axis::new(origin[0], spacing[0], columns),
-                Axis::new(origin[1], spacing[1], rows),
-            ],
+            axes: [Axis::new(origin[0], spacing[0], columns), Axis::new(origin[1], spacing[1], rows)],
             coefficients: along_x,
         })
     }
@@ -222,13 +190,7 @@ impl Heightfield {
         h: impl Fn(f64, f64) -> Result<f64>,
     ) -> Result<Self> {
         let grid = Grid::fitted(extent, spacing)?;
-        Self::interpolate(
-            grid.origin,
-            grid.spacing,
-            grid.columns,
-            grid.rows,
-            &grid.sample(h)?,
-        )
+        Self::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &grid.sample(h)?)
     }
 
     /// h(x, y), m.
@@ -257,12 +219,7 @@ impl Heightfield {
             h: dot(w, &c),
             d1: [dot(w_x, &c), dot(w, &c_y)],
             d2: [dot(w_xx, &c), dot(w_x, &c_y), dot(w, &c_yy)],
-            d3: [
-                dot(w_xxx, &c),
-                dot(w_xx, &c_y),
-                dot(w_x, &c_yy),
-                dot(w, &c_yyy),
-            ],
+            d3: [dot(w_xxx, &c), dot(w_xx, &c_y), dot(w_x, &c_yy), dot(w, &c_yyy)],
         }
     }
 

@@ -23,12 +23,7 @@ pub(super) struct Weights<const ORDERS: usize> {
 
 impl Axis {
     pub fn new(origin: f64, spacing: f64, count: usize) -> Self {
-        Self {
-            origin,
-            spacing,
-            count,
-            rate: 1.0 / spacing,
-        }
+        Self { origin, spacing, count, rate: 1.0 / spacing }
     }
 
     pub fn end(&self) -> f64 {
@@ -43,20 +38,11 @@ impl Axis {
         // A NaN ends up in the first cell with NaN weights.
         let first = (u as usize).min(self.count - 2);
         if u < 0.0 {
-            Weights {
-                first: 0,
-                weights: self.beyond(0.0, x - self.origin),
-            }
+            Weights { first: 0, weights: self.beyond(0.0, x - self.origin) }
         } else if u > last {
-            Weights {
-                first,
-                weights: self.beyond(1.0, x - self.end()),
-            }
+            Weights { first, weights: self.beyond(1.0, x - self.end()) }
         } else {
-            Weights {
-                first,
-                weights: self.inside(u - first as f64),
-            }
+            Weights { first, weights: self.inside(u - first as f64) }
         }
     }
 
@@ -74,12 +60,7 @@ impl Axis {
                     2.0 / 3.0 - r * r * (1.0 - 0.5 * r),
                     s * s * s / 6.0,
                 ],
-                1 => [
-                    -0.5 * r * r,
-                    s * (1.5 * s - 2.0),
-                    -r * (1.5 * r - 2.0),
-                    0.5 * s * s,
-                ],
+                1 => [-0.5 * r * r, s * (1.5 * s - 2.0), -r * (1.5 * r - 2.0), 0.5 * s * s],
                 2 => [r, 3.0 * s - 2.0, 3.0 * r - 2.0, s],
                 _ => [-1.0, 3.0, -3.0, 1.0],
             };

@@ -56,13 +56,7 @@ impl Axis {
                 *b = [b[0], b[1] - b[3], b[2] - 4.0 * b[3], 6.0 * b[3]];
             }
         }
-        Sample {
-            at,
-            weight,
-            first: w.first,
-            value,
-            slope: slope.map(|s| s / self.cell),
-        }
+        Sample { at, weight, first: w.first, value, slope: slope.map(|s| s / self.cell) }
     }
 
     /// The points of a composite rule over the axis.
@@ -71,11 +65,7 @@ impl Axis {
             Rule::Lobatto => (0..=2 * self.cells)
                 .map(|i| {
                     let end = i == 0 || i == 2 * self.cells;
-                    let weight = if end {
-                        1.0 / 6.0
-                    } else {
-                        [1.0 / 3.0, 2.0 / 3.0][i % 2]
-                    };
+                    let weight = if end { 1.0 / 6.0 } else { [1.0 / 3.0, 2.0 / 3.0][i % 2] };
                     self.sample(0.5 * i as f64, weight * self.cell)
                 })
                 .collect(),
@@ -84,16 +74,9 @@ impl Axis {
                 let outer = ((3.0 + 2.0 * root) / 7.0).sqrt();
                 let inner = ((3.0 - 2.0 * root) / 7.0).sqrt();
                 let heavy = (18.0 + 30.0_f64.sqrt()) / 72.0;
-                let rule = [
-                    (-outer, 0.5 - heavy),
-                    (-inner, heavy),
-                    (inner, heavy),
-                    (outer, 0.5 - heavy),
-                ];
+                let rule = [(-outer, 0.5 - heavy), (-inner, heavy), (inner, heavy), (outer, 0.5 - heavy)];
                 (0..self.cells)
-                    .flat_map(|i| {
-                        rule.map(|(x, w)| self.sample(i as f64 + 0.5 + 0.5 * x, w * self.cell))
-                    })
+                    .flat_map(|i| rule.map(|(x, w)| self.sample(i as f64 + 0.5 + 0.5 * x, w * self.cell)))
                     .collect()
             }
         }
@@ -141,11 +124,7 @@ impl Projection {
                     // L[k][l] is in the band whenever l ≥ k − 3, which l ≥ row − 3 implies.
                     sum -= factor[row][3 + l - row] * factor[k][3 + l - k];
                 }
-                factor[row][3 + k - row] = if k == row {
-                    sum.sqrt()
-                } else {
-                    sum / factor[k][3]
-                };
+                factor[row][3 + k - row] = if k == row { sum.sqrt() } else { sum / factor[k][3] };
             }
         }
         Projection { samples, factor }
@@ -172,10 +151,7 @@ impl Projection {
 /// Row `to` −= factor · row `from`.
 fn subtract_row(lines: &mut [f64], width: usize, to: usize, from: usize, factor: f64) {
     let (low, high) = lines.split_at_mut(to.max(from) * width);
-    let (a, b) = (
-        &mut low[to.min(from) * width..][..width],
-        &mut high[..width],
-    );
+    let (a, b) = (&mut low[to.min(from) * width..][..width], &mut high[..width]);
     let (target, source) = if to < from { (a, b) } else { (b, a) };
     for (t, s) in target.iter_mut().zip(source) {
         *t -= factor * *s;

@@ -13,12 +13,7 @@ fn in_cell(t: f64) -> [[f64; 4]; MAX_ORDER + 1] {
             (((3.0 - 3.0 * t) * t + 3.0) * t + 1.0) / 6.0,
             t * t * t / 6.0,
         ],
-        [
-            -r * r / 2.0,
-            (3.0 * t - 4.0) * t / 2.0,
-            ((2.0 - 3.0 * t) * t + 1.0) / 2.0,
-            t * t / 2.0,
-        ],
+        [-r * r / 2.0, (3.0 * t - 4.0) * t / 2.0, ((2.0 - 3.0 * t) * t + 1.0) / 2.0, t * t / 2.0],
         [r, 3.0 * t - 2.0, 1.0 - 3.0 * t, t],
         [-1.0, 3.0, -3.0, 1.0],
     ]
@@ -49,11 +44,7 @@ pub(super) fn axis_weights<const M: usize>(s: f64, cells: usize) -> AxisWeights<
     let b = in_cell(inside - first as f64);
     let over = s - inside;
     if over == 0.0 {
-        return AxisWeights {
-            first,
-            weight: std::array::from_fn(|m| b[m]),
-            shift: [0.0; M],
-        };
+        return AxisWeights { first, weight: std::array::from_fn(|m| b[m]), shift: [0.0; M] };
     }
     let sign = over.signum();
     let distance = over.abs();
@@ -88,11 +79,7 @@ pub(super) fn axis_weights<const M: usize>(s: f64, cells: usize) -> AxisWeights<
     for k in 0..4 {
         weight[0][k] += b[0][k];
     }
-    AxisWeights {
-        first,
-        weight,
-        shift,
-    }
+    AxisWeights { first, weight, shift }
 }
 
 #[cfg(test)]
@@ -107,17 +94,10 @@ mod tests {
             let coefficient = |k: usize| (w.first + k) as f64 - 1.0;
             for m in 0..4 {
                 let sum: f64 = w.weight[m].iter().sum();
-                let identity: f64 =
-                    (0..4).map(|k| w.weight[m][k] * coefficient(k)).sum::<f64>() + w.shift[m];
-                assert!(
-                    (sum - f64::from(u8::from(m == 0))).abs() < 1e-13,
-                    "sum at {s}, order {m}: {sum}"
-                );
+                let identity: f64 = (0..4).map(|k| w.weight[m][k] * coefficient(k)).sum::<f64>() + w.shift[m];
+                assert!((sum - f64::from(u8::from(m == 0))).abs() < 1e-13, "sum at {s}, order {m}: {sum}");
                 let expected = [s, 1.0, 0.0, 0.0][m];
-                assert!(
-                    (identity - expected).abs() < 1e-12,
-                    "identity at {s}, order {m}: {identity}"
-                );
+                assert!((identity - expected).abs() < 1e-12, "identity at {s}, order {m}: {identity}");
             }
         }
     }
@@ -140,10 +120,7 @@ mod tests {
             let (left, right) = (dense(s - 1e-9), dense(s + 1e-9));
             for m in 0..3 {
                 for k in 0..9 {
-                    assert!(
-                        (left[m][k] - right[m][k]).abs() < 1e-7,
-                        "at {s}, order {m}, coefficient {k}"
-                    );
+                    assert!((left[m][k] - right[m][k]).abs() < 1e-7, "at {s}, order {m}, coefficient {k}");
                 }
             }
         }

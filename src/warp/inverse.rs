@@ -25,10 +25,7 @@ impl WarpMap {
             let jet = self.jet((*x).into(), Order::First);
             let residual = Vector3::from(jet.position) - target;
             let jacobian = Matrix3::from_fn(|r, c| jet.jacobian[r][c]);
-            (
-                residual.norm(),
-                jacobian.try_inverse().map(|inverse| inverse * residual),
-            )
+            (residual.norm(), jacobian.try_inverse().map(|inverse| inverse * residual))
         };
         let value = |x: &Vector3<f64>| Vector3::from(self.position((*x).into()));
         let found = solve(guess, Vector3::from(p), value, step);
@@ -45,10 +42,7 @@ impl WarpMap {
             let jet = self.jet([x[0], x[1], 0.0], Order::First);
             let residual = Vector2::new(jet.position[0], jet.position[1]) - target;
             let jacobian = Matrix2::from_fn(|r, c| jet.jacobian[r][c]);
-            (
-                residual.norm(),
-                jacobian.try_inverse().map(|inverse| inverse * residual),
-            )
+            (residual.norm(), jacobian.try_inverse().map(|inverse| inverse * residual))
         };
         let value = |x: &Vector2<f64>| {
             let p = self.position([x[0], x[1], 0.0]);
@@ -135,14 +129,10 @@ fn newton<V: Point>(mut x: V, target: &V, step: &impl Fn(&V, &V) -> (f64, Option
 
 /// What Newton's method needs of a vector.
 trait Point:
-    Copy
-    + std::ops::Sub<Output = Self>
-    + std::ops::Add<Output = Self>
-    + std::ops::Mul<f64, Output = Self>
+    Copy + std::ops::Sub<Output = Self> + std::ops::Add<Output = Self> + std::ops::Mul<f64, Output = Self>
 {
 }
-impl<
-    T: Copy + std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
-> Point for T
+impl<T: Copy + std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>> Point
+    for T
 {
 }

@@ -11,28 +11,13 @@ impl WarpMap {
     ///
     /// # Errors
     /// When `spec` makes no grid, or h is not finite somewhere on the rectangle.
-    pub fn shear_of(
-        extent: [f64; 4],
-        spec: &MapSpec,
-        height: impl Fn(f64, f64) -> f64,
-    ) -> Result<WarpMap> {
+    pub fn shear_of(extent: [f64; 4], spec: &MapSpec, height: impl Fn(f64, f64) -> f64) -> Result<WarpMap> {
         let mut map = WarpMap::flat(extent, spec)?;
         let ([nx, ny, nz], [width, length, _]) = (map.cells(), map.cell());
-        let (x, y) = (
-            Axis {
-                cells: nx,
-                cell: width,
-            },
-            Axis {
-                cells: ny,
-                cell: length,
-            },
-        );
+        let (x, y) = (Axis { cells: nx, cell: width }, Axis { cells: ny, cell: length });
         let bottom = Bottom::new(&x, &y);
-        let heights: Vec<f64> = bottom
-            .positions()
-            .map(|[s, t]| height(extent[0] + s * width, extent[2] + t * length))
-            .collect();
+        let heights: Vec<f64> =
+            bottom.positions().map(|[s, t]| height(extent[0] + s * width, extent[2] + t * length)).collect();
         if let Some(i) = heights.iter().position(|h| !h.is_finite()) {
             let [s, t] = bottom.positions().nth(i).unwrap_or_default();
             return Err(Error::input(format!(
