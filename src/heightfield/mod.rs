@@ -3,7 +3,10 @@
 //! h interpolates samples on a regular grid (not-a-knot ends) and is continued beyond the grid's rectangle: curvature and
 //! slope fade out there, so that h is C² and bounded on the whole plane and constant far away. Every derivative is that
 //! of the very function that [`Heightfield::height`] returns, inside and outside.
+//!
+//! [`raster`] is what happens to measured heights before they are interpolated: filling holes and smoothing.
 
+pub mod raster;
 mod spline;
 
 use crate::error::{Error, Result};
