@@ -9,12 +9,8 @@ const FUNCTIONS: &str = "CreateIpoptProblem|FreeIpoptProblem|AddIpopt(Str|Num|In
 
 /// The names that the safe layer uses, and what they are called in headers that spell them differently:
 /// 3.11 has its own typedefs (`Bool` is `int`), 3.14 has `ipnumber`, `ipindex` and C's `bool`.
-const ALIASES: [(&str, &str); 4] = [
-    ("Number", "ipnumber"),
-    ("Index", "ipindex"),
-    ("Int", "ipindex"),
-    ("Bool", "bool"),
-];
+const ALIASES: [(&str, &str); 4] =
+    [("Number", "ipnumber"), ("Index", "ipindex"), ("Int", "ipindex"), ("Bool", "bool")];
 
 /// Rust declarations for the header `IpStdCInterface.h` at `header`, with the same type names in all its dialects.
 ///
@@ -49,7 +45,5 @@ pub fn generate(header: &Path, clang_args: &[String]) -> Result<String, String> 
 /// Whether the generated source has a type alias of that name, however it is spaced.
 fn declares_type(source: &str, name: &str) -> bool {
     let words: Vec<&str> = source.split_whitespace().collect();
-    words
-        .windows(4)
-        .any(|four| four[..2] == ["pub", "type"] && four[2..] == [name, "="])
+    words.windows(4).any(|four| four[..2] == ["pub", "type"] && four[2..] == [name, "="])
 }

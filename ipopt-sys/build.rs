@@ -45,33 +45,21 @@ fn run() -> Result<(), String> {
 
     // Only Ipopt itself: Debian's ipopt.pc also names -lblas and -llapack, which its package does not depend on
     // and which a shared libipopt does not need from us.
-    println!(
-        "cargo::rustc-link-search=native={}",
-        ipopt.library_dir.display()
-    );
+    println!("cargo::rustc-link-search=native={}", ipopt.library_dir.display());
     println!("cargo::rustc-link-lib=dylib=ipopt");
     Ok(())
 }
 
 fn variable(name: &str) -> Option<PathBuf> {
     println!("cargo::rerun-if-env-changed={name}");
-    env::var_os(name)
-        .filter(|value| !value.is_empty())
-        .map(PathBuf::from)
+    env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from)
 }
 
 fn from_environment(include_dir: &Path, library_dir: PathBuf) -> Result<Installation, String> {
     if !library_dir.is_dir() {
-        return Err(format!(
-            "IPOPT_LIB_DIR: there is no folder {}.",
-            library_dir.display()
-        ));
+        return Err(format!("IPOPT_LIB_DIR: there is no folder {}.", library_dir.display()));
     }
-    let folders = [
-        include_dir.into(),
-        include_dir.join("coin-or"),
-        include_dir.join("coin"),
-    ];
+    let folders = [include_dir.into(), include_dir.join("coin-or"), include_dir.join("coin")];
     Ok(Installation {
         header: find_header(&folders).map_err(|error| format!("IPOPT_INCLUDE_DIR: {error}"))?,
         library_dir,
@@ -86,8 +74,7 @@ fn from_pkg_config() -> Result<Installation, String> {
         .env_metadata(true)
         .probe("ipopt")
         .map_err(|error| error.to_string())?;
-    let library_dir =
-        pkg_config::get_variable("ipopt", "libdir").map_err(|error| error.to_string())?;
+    let library_dir = pkg_config::get_variable("ipopt", "libdir").map_err(|error| error.to_string())?;
     let clang_args = library
         .defines
         .iter()
@@ -104,15 +91,8 @@ fn from_pkg_config() -> Result<Installation, String> {
 }
 
 fn find_header(folders: &[PathBuf]) -> Result<PathBuf, String> {
-    folders
-        .iter()
-        .map(|folder| folder.join(HEADER))
-        .find(|path| path.is_file())
-        .ok_or_else(|| {
-            let searched: Vec<String> = folders
-                .iter()
-                .map(|path| path.display().to_string())
-                .collect();
-            format!("there is no {HEADER} in {}.", searched.join(", "))
-        })
+    folders.iter().map(|folder| folder.join(HEADER)).find(|path| path.is_file()).ok_or_else(|| {
+        let searched: Vec<String> = folders.iter().map(|path| path.display().to_string()).collect();
+        format!("there is no {HEADER} in {}.", searched.join(", "))
+    })
 }

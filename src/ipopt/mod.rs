@@ -88,14 +88,7 @@ pub trait NlpProblem {
         new_multipliers: bool,
         out: &mut [f64],
     ) {
-        let _ = (
-            x,
-            new_x,
-            objective_factor,
-            multipliers,
-            new_multipliers,
-            out,
-        );
+        let _ = (x, new_x, objective_factor, multipliers, new_multipliers, out);
         unreachable!("a problem with a Hessian structure computes the Hessian's values");
     }
 }

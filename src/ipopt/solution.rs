@@ -168,10 +168,7 @@ impl Status {
     /// Whether Ipopt's own convergence test was met, at least to the acceptable tolerance.
     #[must_use]
     pub fn converged(self) -> bool {
-        matches!(
-            self,
-            Self::Solved | Self::Acceptable | Self::FeasiblePointFound
-        )
+        matches!(self, Self::Solved | Self::Acceptable | Self::FeasiblePointFound)
     }
 }
 

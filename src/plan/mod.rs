@@ -1,5 +1,7 @@
 //! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
 
+pub mod sampled;
+
 use serde::{Deserialize, Serialize};
 
 use crate::robot::Box3;

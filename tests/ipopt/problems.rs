@@ -44,10 +44,7 @@ impl Hs071 {
     }
 
     pub fn with_jacobian_rows(rows: Vec<i32>) -> Self {
-        Self {
-            jacobian_rows: rows,
-            ..Self::new(true)
-        }
+        Self { jacobian_rows: rows, ..Self::new(true) }
     }
 }
 
@@ -106,8 +103,7 @@ impl NlpProblem for Hs071 {
     }
 
     fn hessian_structure(&self) -> Option<(&[i32], &[i32])> {
-        self.with_hessian
-            .then_some((&HESSIAN_ROWS, &HESSIAN_COLUMNS))
+        self.with_hessian.then_some((&HESSIAN_ROWS, &HESSIAN_COLUMNS))
     }
 
     fn hessian_values(
@@ -120,18 +116,7 @@ impl NlpProblem for Hs071 {
         out: &mut [f64],
     ) {
         (self.on_call)("hessian");
-        let objective = [
-            2.0 * x[3],
-            x[3],
-            0.0,
-            x[3],
-            0.0,
-            0.0,
-            2.0 * x[0] + x[1] + x[2],
-            x[0],
-            x[0],
-            0.0,
-        ];
+        let objective = [2.0 * x[3], x[3], 0.0, x[3], 0.0, 0.0, 2.0 * x[0] + x[1] + x[2], x[0], x[0], 0.0];
         for (entry, (&row, &column)) in HESSIAN_ROWS.iter().zip(&HESSIAN_COLUMNS).enumerate() {
             let (row, column) = (row as usize, column as usize);
             let constraints = if row == column {
