@@ -2,13 +2,15 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use warpgait::heightfield::Heightfield;
 use warpgait::scenario::MapSpec;
 use warpgait::warp::{Order, WarpMap};
 
 fn evaluation(criterion: &mut Criterion) {
     let height = |x: f64, y: f64| 0.15 * (2.6 * x).sin() * (2.6 * y).sin();
-    let map = WarpMap::shear_of([-3.0, 3.0, -3.0, 3.0], &MapSpec::default(), height)
-        .expect("a valid map");
+    let field = Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.02, |x, y| Ok(height(x, y)))
+        .expect("a valid terrain");
+    let map = WarpMap::shear(&field, &MapSpec::default()).expect("a valid map");
     // Points along a line, as a motion visits them.
     let points: Vec<[f64; 3]> = (0..256)
         .map(|i| f64::from(i) / 256.0)

@@ -1,9 +1,16 @@
 //! The warp φ: F → A, a tri-cubic B-spline whose bottom face is the terrain.
 
+mod assembly;
 mod axis;
 mod basis;
 mod bottom;
+pub mod build;
+mod density;
 mod inverse;
+mod lbfgs;
+mod preconditioner;
+mod problem;
+mod refine;
 mod shear;
 mod spline;
 
