@@ -7,7 +7,8 @@
 //! slab (contracted along z) → plane (along x) → row (along y) → ρ, ∂ρ/∂J → back into row, plane, slab.
 
 use super::axis::{Axis, Rule, Sample};
-use super::density::{Density, LANES, Lanes, determinant};
+use super::density::{Density, determinant};
+use super::lanes::{LANES, Lanes};
 
 /// The tensor grid and its weights.
 pub(super) struct Assembly {
@@ -40,10 +41,22 @@ impl Assembly {
         }
         while z.len() % LANES != 0 {
             let last = z[z.len() - 1];
-            z.push(Sample { weight: 0.0, ..last });
+            z.push(Sample {
+                weight: 0.0,
+                ..last
+            });
         }
-        let weight_z = z.chunks_exact(LANES).map(|s| std::array::from_fn(|l| s[l].weight)).collect();
-        Assembly { axes, x, y, z, weight_z }
+        let weight_z = z
+            .chunks_exact(LANES)
+            .map(|s| Lanes(std::array::from_fn(|l| s[l].weight)))
+            .collect();
+        Assembly {
+            axes,
+            x,
+            y,
+            z,
+            weight_z,
+        }
     }
 
     /// The points along an axis, with their weights.
@@ -56,7 +69,7 @@ impl Assembly {
     pub fn energy(&self, density: impl Density, coefficients: &[f64], gradient: &mut [f64]) -> f64 {
         let [_, ny, nz] = self.axes.map(|a| a.len());
         let blocks = self.weight_z.len();
-        let empty = |kinds: usize| vec![[0.0; LANES]; ny * kinds * blocks];
+        let empty = |kinds: usize| vec![Lanes::ZERO; ny * kinds * blocks];
         let mut slabs: [Vec<Lanes>; 4] = std::array::from_fn(|_| empty(SLAB_KINDS));
         let mut slab_gradients = slabs.clone();
         let mut plane = empty(PLANE_KINDS);
@@ -71,21 +84,39 @@ impl Assembly {
             }
             while entered < sx.first + 4 {
                 self.slab(coefficients, entered, &mut slabs[entered % 4]);
-                slab_gradients[entered % 4].fill([0.0; LANES]);
+                slab_gradients[entered % 4].fill(Lanes::ZERO);
                 entered += 1;
             }
             let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
-            plane_gradient.fill([0.0; LANES]);
+            plane_of(
+                sx,
+                [window(0), window(1), window(2), window(3)],
+                blocks,
+                &mut plane,
+            );
+            plane_gradient.fill(Lanes::ZERO);
             for sy in &self.y {
                 let weight = sx.weight * sy.weight;
-                energy += row(density, sy, weight, &self.weight_z, &plane, &mut plane_gradient);
+                energy += row(
+                    density,
+                    sy,
+                    weight,
+                    &self.weight_z,
+                    &plane,
+                    &mut plane_gradient,
+                );
                 if !energy.is_finite() {
                     return f64::INFINITY;
                 }
             }
             for k in 0..4 {
-                plane_adjoint(sx, k, &plane_gradient, blocks, &mut slab_gradients[(sx.first + k) % 4]);
+                plane_adjoint(
+                    sx,
+                    k,
+                    &plane_gradient,
+                    blocks,
+                    &mut slab_gradients[(sx.first + k) % 4],
+                );
             }
         }
         while finished < entered {
@@ -101,8 +132,8 @@ impl Assembly {
         let ny = self.axes[1].len();
         let blocks = self.weight_z.len();
         let mut slabs: [Vec<Lanes>; 4] =
-            std::array::from_fn(|_| vec![[0.0; LANES]; ny * SLAB_KINDS * blocks]);
-        let mut plane = vec![[0.0; LANES]; ny * PLANE_KINDS * blocks];
+            std::array::from_fn(|_| vec![Lanes::ZERO; ny * SLAB_KINDS * blocks]);
+        let mut plane = vec![Lanes::ZERO; ny * PLANE_KINDS * blocks];
         let mut entered = 0;
         let (mut least, mut folded, mut at) = (f64::INFINITY, 0, [0.0; 3]);
         for sx in &self.x {
@@ -111,12 +142,17 @@ impl Assembly {
                 entered += 1;
             }
             let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
+            plane_of(
+                sx,
+                [window(0), window(1), window(2), window(3)],
+                blocks,
+                &mut plane,
+            );
             for sy in &self.y {
                 for b in 0..blocks {
                     let jacobian = jacobian_lanes(sy, &plane, blocks, b);
-                    for (l, sz) in self.z[b * LANES..][..LANES].iter().enumerate() {
-                        let det = determinant(&jacobian.map(|lanes| lanes[l]));
+                    let determinants = determinant(&jacobian).0;
+                    for (det, sz) in determinants.into_iter().zip(&self.z[b * LANES..]) {
                         // The points that only fill the lanes repeat the last one and do not count.
                         folded += usize::from(!(det > 0.0) && sz.weight != 0.0);
                         if !(det >= least) {
@@ -137,12 +173,15 @@ impl Assembly {
             let (values, slopes) = row.split_at_mut(3 * blocks);
             for c in 0..3 {
                 let line = &coefficients[((c * nx + index) * ny + j) * nz..][..nz];
-                let values = values[c * blocks..][..blocks].as_flattened_mut();
-                let slopes = slopes[c * blocks..][..blocks].as_flattened_mut();
-                for ((value, slope), s) in values.iter_mut().zip(slopes).zip(&self.z) {
-                    let u = &line[s.first..s.first + 4];
-                    *value = s.value[0] * u[0] + s.value[1] * u[1] + s.value[2] * u[2] + s.value[3] * u[3];
-                    *slope = s.slope[0] * u[0] + s.slope[1] * u[1] + s.slope[2] * u[2] + s.slope[3] * u[3];
+                for (b, samples) in self.z.chunks_exact(LANES).enumerate() {
+                    let along = |weights: fn(&Sample) -> &[f64; 4]| {
+                        Lanes(std::array::from_fn(|l| {
+                            let (w, u) = (weights(&samples[l]), &line[samples[l].first..][..4]);
+                            w[0] * u[0] + w[1] * u[1] + w[2] * u[2] + w[3] * u[3]
+                        }))
+                    };
+                    values[c * blocks + b] = along(|s| &s.value);
+                    slopes[c * blocks + b] = along(|s| &s.slope);
                 }
             }
         }
@@ -156,9 +195,9 @@ impl Assembly {
             for c in 0..3 {
                 let line = &mut gradient[((c * nx + index) * ny + j) * nz..][..nz];
                 line.fill(0.0);
-                let values = values[c * blocks..][..blocks].as_flattened();
-                let slopes = slopes[c * blocks..][..blocks].as_flattened();
-                for ((value, slope), s) in values.iter().zip(slopes).zip(&self.z) {
+                let values = Lanes::flat(&values[c * blocks..][..blocks]);
+                let slopes = Lanes::flat(&slopes[c * blocks..][..blocks]);
+                for ((value, slope), s) in values.zip(slopes).zip(&self.z) {
                     for (k, u) in line[s.first..s.first + 4].iter_mut().enumerate() {
                         *u += s.value[k] * value + s.slope[k] * slope;
                     }
@@ -188,14 +227,28 @@ fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mu
     if s.value[k] == 0.0 && s.slope[k] == 0.0 {
         return;
     }
-    let rows = plane.chunks_exact(PLANE_KINDS * blocks).zip(slab.chunks_exact_mut(SLAB_KINDS * blocks));
+    let rows = plane
+        .chunks_exact(PLANE_KINDS * blocks)
+        .zip(slab.chunks_exact_mut(SLAB_KINDS * blocks));
     for (source, out) in rows {
         let (values, slopes) = out.split_at_mut(3 * blocks);
         for c in 0..3 {
             let source = &source[3 * c * blocks..][..3 * blocks];
-            accumulate(s.slope[k], &source[..blocks], &mut values[c * blocks..][..blocks]);
-            accumulate(s.value[k], &source[blocks..2 * blocks], &mut values[c * blocks..][..blocks]);
-            accumulate(s.value[k], &source[2 * blocks..], &mut slopes[c * blocks..][..blocks]);
+            accumulate(
+                s.slope[k],
+                &source[..blocks],
+                &mut values[c * blocks..][..blocks],
+            );
+            accumulate(
+                s.value[k],
+                &source[blocks..2 * blocks],
+                &mut values[c * blocks..][..blocks],
+            );
+            accumulate(
+                s.value[k],
+                &source[2 * blocks..],
+                &mut slopes[c * blocks..][..blocks],
+            );
         }
     }
 }
@@ -213,29 +266,21 @@ fn row(
     let blocks = weight_z.len();
     let width = PLANE_KINDS * blocks;
     let targets = &mut plane_gradient[s.first * width..][..4 * width];
-    let mut sum = [0.0; LANES];
+    let mut sum = Lanes::ZERO;
     for b in 0..blocks {
         let jacobian = jacobian_lanes(s, plane, blocks, b);
-        let mut gradient = [[0.0; LANES]; 9];
-        for l in 0..LANES {
-            let (energy, slope) = density.at(jacobian.map(|lanes| lanes[l]));
-            let weight = weight * weight_z[b][l];
-            sum[l] += weight * energy;
-            for i in 0..9 {
-                gradient[i][l] = weight * slope[i];
-            }
-        }
-        for k in 0..4 {
-            for (kind, source) in gradient.iter().enumerate() {
-                let w = if kind % 3 == 1 { s.slope[k] } else { s.value[k] };
-                let target = &mut targets[k * width + kind * blocks + b];
-                for l in 0..LANES {
-                    target[l] += w * source[l];
-                }
+        let (density, slope) = density.at(&jacobian);
+        let weight = weight * weight_z[b];
+        sum += weight * density;
+        for (kind, source) in slope.iter().enumerate() {
+            let source = weight * *source;
+            let w = if kind % 3 == 1 { &s.slope } else { &s.value };
+            for k in 0..4 {
+                targets[k * width + kind * blocks + b] += w[k] * source;
             }
         }
     }
-    sum.iter().sum()
+    sum.sum()
 }
 
 /// Along y: J at the points of one block of a row.
@@ -243,29 +288,30 @@ fn row(
 fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [Lanes; 9] {
     let width = PLANE_KINDS * blocks;
     let sources: [&Row; 4] = std::array::from_fn(|k| &plane[(s.first + k) * width..][..width]);
-    std::array::from_fn(|kind| {
+    let mut jacobian = [Lanes::ZERO; 9];
+    for (kind, out) in jacobian.iter_mut().enumerate() {
         let w = if kind % 3 == 1 { &s.slope } else { &s.value };
-        let [a, b, c, d] = sources.map(|row| &row[kind * blocks + block]);
-        std::array::from_fn(|l| w[0] * a[l] + w[1] * b[l] + w[2] * c[l] + w[3] * d[l])
-    })
+        let at = kind * blocks + block;
+        *out = w[0] * sources[0][at]
+            + w[1] * sources[1][at]
+            + w[2] * sources[2][at]
+            + w[3] * sources[3][at];
+    }
+    jacobian
 }
 
 /// out = Σ wₖ sourceₖ.
 fn combine(w: &[f64; 4], sources: [&Row; 4], out: &mut Row) {
     let [a, b, c, d] = sources;
     for ((((o, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        for l in 0..LANES {
-            o[l] = w[0] * a[l] + w[1] * b[l] + w[2] * c[l] + w[3] * d[l];
-        }
+        *o = w[0] * *a + w[1] * *b + w[2] * *c + w[3] * *d;
     }
 }
 
 /// out += w source.
 fn accumulate(w: f64, source: &Row, out: &mut Row) {
     for (o, a) in out.iter_mut().zip(source) {
-        for l in 0..LANES {
-            o[l] += w * a[l];
-        }
+        *o += w * *a;
     }
 }
 
@@ -276,7 +322,20 @@ mod tests {
 
     #[test]
     fn energy_gradient_matches_central_differences_for_both_rules() {
-        let axes = [Axis { cells: 5, cell: 0.4 }, Axis { cells: 4, cell: 0.5 }, Axis { cells: 4, cell: 0.6 }];
+        let axes = [
+            Axis {
+                cells: 5,
+                cell: 0.4,
+            },
+            Axis {
+                cells: 4,
+                cell: 0.5,
+            },
+            Axis {
+                cells: 4,
+                cell: 0.6,
+            },
+        ];
         let [nx, ny, nz] = axes.map(|a| a.len());
         // Face coefficients of the identity, disturbed.
         let mut u = vec![0.0; 3 * nx * ny * nz];
@@ -305,7 +364,11 @@ mod tests {
                     assembly.energy(Mips, &moved, &mut unused)
                 };
                 let slope = (at_step(1e-5) - at_step(-1e-5)) / 2e-5;
-                assert!((slope - gradient[at]).abs() < 1e-7, "{at}: {slope} {}", gradient[at]);
+                assert!(
+                    (slope - gradient[at]).abs() < 1e-7,
+                    "{at}: {slope} {}",
+                    gradient[at]
+                );
             }
         }
     }

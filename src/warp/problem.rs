@@ -39,14 +39,28 @@ impl<'a, D: Density> Problem<'a, D> {
     /// # Errors
     /// Internal ones of the preconditioner.
     pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, rule: Rule) -> Result<Self> {
-        let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: map.cells()[d], cell: map.cell()[d] });
+        let axes: [Axis; 3] = std::array::from_fn(|d| Axis {
+            cells: map.cells()[d],
+            cell: map.cell()[d],
+        });
         let assembly = Assembly::new(axes, rule, weight, FACE_WEIGHT);
         let bottom = Bottom::new(&axes[0], &axes[1]);
         let [nx, ny, nz] = axes.map(|a| a.len());
-        let free = [[1..nx - 1, 0..ny, 0..nz], [0..nx, 1..ny - 1, 0..nz], [0..nx, 0..ny, 1..nz]];
+        let free = [
+            [1..nx - 1, 0..ny, 0..nz],
+            [0..nx, 1..ny - 1, 0..nz],
+            [0..nx, 0..ny, 1..nz],
+        ];
         let samples = std::array::from_fn(|d| assembly.samples(d));
         let preconditioner = Preconditioner::new(samples, free)?;
-        Ok(Problem { field, density, axes, assembly, bottom, preconditioner })
+        Ok(Problem {
+            field,
+            density,
+            axes,
+            assembly,
+            bottom,
+            preconditioner,
+        })
     }
 
     /// The coefficients of a map, moved up or down as a whole column so that its bottom lies on the ground.
@@ -69,7 +83,9 @@ impl<'a, D: Density> Problem<'a, D> {
         let mut out = map.clone();
         let mut u = u.to_vec();
         for axis in 0..3 {
-            along(&mut u, self.axes.map(|a| a.len()), axis, |line| self.axes[axis].face_to_control(line));
+            along(&mut u, self.axes.map(|a| a.len()), axis, |line| {
+                self.axes[axis].face_to_control(line)
+            });
         }
         let n = u.len() / 3;
         for (i, point) in out.control_points_mut().iter_mut().enumerate() {
@@ -81,13 +97,21 @@ impl<'a, D: Density> Problem<'a, D> {
     /// The bottom-face coefficients of one component.
     fn face(&self, u: &[f64], component: usize) -> Vec<f64> {
         let n = u.len() / 3;
-        u[component * n..][..n].iter().step_by(self.axes[2].len()).copied().collect()
+        u[component * n..][..n]
+            .iter()
+            .step_by(self.axes[2].len())
+            .copied()
+            .collect()
     }
 
     /// φ₀, φ₁ at the Gauss points of the bottom, and the bottom-face coefficients that φ₂ must have there.
     fn ground(&self, u: &[f64]) -> ([Vec<f64>; 2], Vec<f64>) {
         let at = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let heights: Vec<f64> = at[0].iter().zip(&at[1]).map(|(x, y)| self.field.height(*x, *y)).collect();
+        let heights: Vec<f64> = at[0]
+            .iter()
+            .zip(&at[1])
+            .map(|(x, y)| self.field.height(*x, *y))
+            .collect();
         let face = self.bottom.project(&heights);
         (at, face)
     }
@@ -120,7 +144,10 @@ impl<D: Density> Objective for Problem<'_, D> {
             }
         }
         // What is fixed.
-        gradient[2 * n..].iter_mut().step_by(nz).for_each(|g| *g = 0.0);
+        gradient[2 * n..]
+            .iter_mut()
+            .step_by(nz)
+            .for_each(|g| *g = 0.0);
         gradient[..ny * nz].fill(0.0);
         gradient[(nx - 1) * ny * nz..n].fill(0.0);
         for slab in gradient[n..2 * n].chunks_exact_mut(ny * nz) {
@@ -142,7 +169,9 @@ pub(super) fn coefficients_of(map: &WarpMap, axes: &[Axis; 3]) -> Vec<f64> {
         u.extend(map.control_points().iter().map(|p| p[c]));
     }
     for axis in 0..3 {
-        along(&mut u, axes.map(|a| a.len()), axis, |line| axes[axis].control_to_face(line));
+        along(&mut u, axes.map(|a| a.len()), axis, |line| {
+            axes[axis].control_to_face(line)
+        });
     }
     u
 }

@@ -62,8 +62,16 @@ impl WarpMap {
         cell: [f64; 3],
         control_points: Vec<[f64; 3]>,
     ) -> WarpMap {
-        debug_assert_eq!(control_points.len(), cells.iter().map(|n| n + 3).product::<usize>());
-        WarpMap { cells, origin, cell, control_points }
+        debug_assert_eq!(
+            control_points.len(),
+            cells.iter().map(|n| n + 3).product::<usize>()
+        );
+        WarpMap {
+            cells,
+            origin,
+            cell,
+            control_points,
+        }
     }
 
     /// Cells along x, y, z.
