@@ -101,7 +101,7 @@ impl Plan {
 
     /// Whether every array has its length and every value is finite: what the reader would refuse is an error of the
     /// program, and better met before the file is there.
-    fn ensure_sound(&self) -> Result<()> {
+    pub(crate) fn ensure_sound(&self) -> Result<()> {
         let (n, e) = (self.t.len(), self.foot_names.len());
         let base = self.base_members().map(|(name, values)| (name, n, values));
         let feet = self.foot_members().map(|(name, values)| (name, n * e, values));

@@ -9,6 +9,7 @@ mod tests;
 mod validate;
 
 pub use load::{LoadedScenario, load, parse};
+pub(crate) use schema::closest as closest_word;
 pub use schema::json_schema;
 pub use template::template;
 

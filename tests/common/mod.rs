@@ -93,11 +93,46 @@ pub fn standing() -> Plan {
     }
 }
 
-/// Moves every foot's support: adds `[dx, dy, dz]` to all samples of one foot's member.
-pub fn shift(points: &mut [[f64; 3]], foot: usize, by: [f64; 3]) {
-    for point in points.iter_mut().skip(foot).step_by(4) {
-        for axis in 0..3 {
-            point[axis] += by[axis];
+/// The standing robot that shifts its weight onto RF and LH, lifts LF by `height` m for half a second, and stands again.
+pub fn lifting(height: f64) -> Plan {
+    let mut plan = standing();
+    let quarter = MASS * GRAVITY / 4.0;
+    for n in 0..plan.t.len() {
+        // 1 on four feet, 0 on two; smooth from 10 to 50 and back from 150 to 190.
+        let ramp = |from: usize| ((n as f64 - from as f64) / 40.0).clamp(0.0, 1.0);
+        let smooth = |s: f64| s * s * (3.0 - 2.0 * s);
+        let share = 1.0 - smooth(ramp(10)) + smooth(ramp(150));
+        for (foot, force) in [share, 2.0 - share, 2.0 - share, share].into_iter().enumerate() {
+            plan.foot_force[4 * n + foot] = [0.0, 0.0, quarter * force];
+        }
+        if n > 50 && n < 150 {
+            let rate = std::f64::consts::PI / 0.5;
+            let phase = rate * (plan.t[n] - 0.25);
+            plan.foot_contact[4 * n] = false;
+            plan.foot_position[4 * n][2] = height * phase.sin().powi(2);
+            plan.foot_velocity[4 * n][2] = height * rate * (2.0 * phase).sin();
+            plan.foot_acceleration[4 * n][2] = 2.0 * height * rate * rate * (2.0 * phase).cos();
         }
     }
+    plan.phase_durations[0] = vec![0.25, 0.5, 0.25];
+    plan
+}
+
+/// The standing robot on ground that rises by `slope` along x.
+pub fn on_slope(slope: f64) -> Plan {
+    let mut plan = standing();
+    for (i, h) in plan.ground.height.iter_mut().enumerate() {
+        *h = slope * (-2.0 + 0.05 * (i % plan.ground.columns) as f64);
+    }
+    let length = slope.hypot(1.0);
+    plan.foot_normal.fill([-slope / length, 0.0, 1.0 / length]);
+    for point in &mut plan.foot_position {
+        point[2] = slope * point[0];
+    }
+    plan
+}
+
+/// Adds a line to a section of the plan's scenario, which must not be there yet.
+pub fn ask(plan: &mut Plan, section: &str, line: &str) {
+    plan.meta.scenario.push_str(&format!("[{section}]\n{line}\n"));
 }
