@@ -6,6 +6,7 @@
 pub mod check;
 pub mod cli;
 pub mod constraints;
+pub mod costs;
 pub mod error;
 pub mod heightfield;
 pub mod ipopt;

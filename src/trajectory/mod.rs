@@ -1,1 +1,14 @@
-//! trajectory (placeholder).
+//! The motion as splines: which foot stands when, and how every sampled quantity depends linearly on the variables.
+//!
+//! Everything here is the same for both formulations. Whether a node is a point of F or of ambient space is decided in
+//! [`crate::nlp::nodes`].
+
+pub mod gait;
+pub mod layout;
+pub mod rotation;
+pub mod sampling;
+pub mod space;
+pub mod spline;
+
+pub use gait::{Gait, Stance, Swing};
+pub use layout::{Layout, LinearNode};

@@ -1,0 +1,104 @@
+//! The torso's underside stays clear of the ground.
+//!
+//! ```text
+//!   zᵀq − h(q) ≥ base_clearance,  q = p + R b, for points b of the underside
+//! ```
+//!
+//! Rows: every second point of the grid at every `STRIDE`-th sample, m. The whole footprint is looked at by `check`.
+
+use nalgebra::Vector3;
+
+use super::{Constraint, Place, height_form};
+use crate::heightfield::HeightJet;
+use crate::nlp::sink::Sink;
+use crate::nlp::state::{BaseNode, Curvature, Tangent};
+use crate::nlp::{Model, State};
+use crate::trajectory::rotation::cross_matrix;
+
+/// Samples between two that are looked at.
+const STRIDE: usize = 4;
+
+/// The underside over the ground.
+#[derive(Clone, Debug)]
+pub struct BaseClearance {
+    clearance: f64,
+    places: Vec<(usize, Vector3<f64>)>,
+}
+
+impl BaseClearance {
+    /// Over the whole motion.
+    pub fn new(model: &Model, clearance: f64) -> Self {
+        let places = (0..=model.layout.intervals)
+            .step_by(STRIDE)
+            .flat_map(|k| model.underside.iter().step_by(2).map(move |&b| (k, b)))
+            .collect();
+        Self { clearance, places }
+    }
+}
+
+/// R b, the ground under q, the gap and its derivative in q.
+fn point(model: &Model, base: &BaseNode, b: &Vector3<f64>) -> (Vector3<f64>, HeightJet, f64, Vector3<f64>) {
+    let arm = base.rotation() * b;
+    let q = base.position() + arm;
+    let ground = model.ground.jet(q.x, q.y);
+    (arm, ground, q.z - ground.h, Vector3::new(-ground.d1[0], -ground.d1[1], 1.0))
+}
+
+impl Constraint for BaseClearance {
+    fn name(&self) -> &'static str {
+        "base clearance"
+    }
+
+    fn rows(&self) -> usize {
+        self.places.len()
+    }
+
+    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        lower.fill(self.clearance);
+        upper.fill(f64::INFINITY);
+    }
+
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+        for (value, (k, b)) in out.iter_mut().zip(&self.places) {
+            *value = point(model, &state.base[*k], b).2;
+        }
+    }
+
+    fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
+        for (r, (k, b)) in self.places.iter().enumerate() {
+            let (base, node) = (&state.base[*k], &model.layout.base[*k]);
+            let (arm, _, _, by_q) = point(model, base, b);
+            // dq = dp + δ × R b.
+            Tangent::position(model, &base.point, node).row(first + r, &by_q, sink);
+            Tangent::turn(model, base, node).row(first + r, &arm.cross(&by_q), sink);
+        }
+    }
+
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        multipliers: &[f64],
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
+        for (&lambda, (k, b)) in multipliers.iter().zip(&self.places) {
+            let (base, node) = (&state.base[*k], &model.layout.base[*k]);
+            let (arm, ground, _, by_q) = point(model, base, b);
+            curvature.base_position[*k] += by_q * lambda;
+            curvature.base_rotation[*k] += by_q * b.transpose() * lambda;
+            let form = height_form(&ground) * -lambda;
+            let position = Tangent::position(model, &base.point, node);
+            let turn = Tangent::turn(model, base, node);
+            // dq = dp − [R b] δ.
+            let by_turn = -cross_matrix(&arm);
+            position.quadratic(&form, sink);
+            position.cross(&(form * by_turn), &turn, sink);
+            turn.quadratic(&(by_turn.transpose() * form * by_turn), sink);
+        }
+    }
+
+    fn place(&self, row: usize) -> Place {
+        Place { foot: None, sample: self.places[row].0 as f64 }
+    }
+}

@@ -1,0 +1,278 @@
+//! Eq. 11, the position-based centroidal dynamics (PCDM), centred and with gravity, or backward as printed.
+//!
+//! ```text
+//!   Σ_l w_l Σ_i f_i(t_l) + m g                    = m/Δt² Σ_j c_j p(t_j)
+//!   Σ_l w_l Σ_i (p_i(t_l) − p(t_l)) × f_i(t_l)    = −1/Δt² Σ_j c'_j ρ∫ R(t_j) x × R(t) x dv
+//!                                                 = 1/Δt² axis(N − Nᵀ),  N = Σ_j c'_j R(t_j) S R(t)ᵀ
+//! ```
+//!
+//! | law | c over t₋₋ t₋ t t₊ | c' | w |
+//! | --- | --- | --- | --- |
+//! | `pcdm` | 0 1 −2 1 | 0 1 · 1 | 1/6 at t₋, 2/3 at t, 1/6 at t₊ |
+//! | `pcdm-backward` (Eq. 11) | 1 −2 1 0 | 1 −2 · 0 | 1 at t |
+//!
+//! The centred second difference is p̈ averaged with the hat function over [t₋, t₊]. Averaging the forces in the same way
+//! makes the row the integral of the law against that hat. Forces are linear between samples, and so is p̈ (nearly); a
+//! residual that is linear between samples, has no hat average and vanishes at both ends of the motion vanishes
+//! everywhere. At the first and last sample the robot rests, and the row is the balance of forces there.
+//!
+//! Rows: 6 a sample, force then torque about the centre of mass, world frame, in m g and m g · 1 m.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Constraint, Place};
+use crate::nlp::model::GRAVITY;
+use crate::nlp::sink::Sink;
+use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::{Model, State};
+use crate::trajectory::rotation::{cross_matrix, skew_part};
+
+/// Which samples enter the law at one sample, with which weights.
+#[derive(Clone, Debug, Default)]
+struct Stencil {
+    /// w: forces and torques.
+    wrench: Vec<(usize, f64)>,
+    /// c: positions.
+    position: Vec<(usize, f64)>,
+    /// c': the other rotations.
+    turn: Vec<(usize, f64)>,
+}
+
+/// Newton's and Euler's law at every sample.
+#[derive(Clone, Debug)]
+pub struct Dynamics {
+    stencils: Vec<Stencil>,
+}
+
+impl Dynamics {
+    /// Second order: the default.
+    pub fn centred(intervals: usize) -> Self {
+        Self::new(intervals, |k| Stencil {
+            wrench: vec![(k - 1, 1.0 / 6.0), (k, 2.0 / 3.0), (k + 1, 1.0 / 6.0)],
+            position: vec![(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)],
+            turn: vec![(k - 1, 1.0), (k + 1, 1.0)],
+        })
+    }
+
+    /// First order, as the paper prints it (with gravity). Before the start the robot rests.
+    pub fn backward(intervals: usize) -> Self {
+        Self::new(intervals, |k| {
+            let before = k.saturating_sub(2);
+            Stencil {
+                wrench: vec![(k, 1.0)],
+                position: vec![(k, 1.0), (k - 1, -2.0), (before, 1.0)],
+                turn: vec![(k - 1, -2.0), (before, 1.0)],
+            }
+        })
+    }
+
+    fn new(intervals: usize, inner: impl Fn(usize) -> Stencil) -> Self {
+        let stencils = (0..=intervals)
+            .map(|k| {
+                if k == 0 || k == intervals {
+                    Stencil { wrench: vec![(k, 1.0)], ..Stencil::default() }
+                } else {
+                    inner(k)
+                }
+            })
+            .collect();
+        Self { stencils }
+    }
+
+    /// The multipliers of the force and the torque at sample l, which enter the rows of its neighbours too.
+    fn wrench_multipliers(&self, multipliers: &[f64], l: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
+        for k in l.saturating_sub(1)..=(l + 1).min(self.stencils.len() - 1) {
+            for &(_, weight) in self.stencils[k].wrench.iter().filter(|w| w.0 == l) {
+                force += Vector3::from_column_slice(&multipliers[6 * k..6 * k + 3]) * weight;
+                torque += Vector3::from_column_slice(&multipliers[6 * k + 3..6 * k + 6]) * weight;
+            }
+        }
+        (force, torque)
+    }
+
+    /// Σ c' R(t_j) S, the left side of N.
+    fn turned(&self, model: &Model, state: &State, k: usize) -> Matrix3<f64> {
+        self.stencils[k].turn.iter().map(|&(j, c)| state.base[j].rotation() * c).sum::<Matrix3<f64>>()
+            * model.second_moment
+    }
+}
+
+/// 1/(Δt² m g): from kg m²/s² to m g · 1 m.
+fn torque_scale(model: &Model) -> f64 {
+    1.0 / (model.layout.time_step.powi(2) * model.mass * GRAVITY)
+}
+
+impl Constraint for Dynamics {
+    fn name(&self) -> &'static str {
+        "dynamics"
+    }
+
+    fn rows(&self) -> usize {
+        6 * self.stencils.len()
+    }
+
+    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        lower.fill(0.0);
+        upper.fill(0.0);
+    }
+
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+        let acceleration = 1.0 / (model.layout.time_step.powi(2) * GRAVITY);
+        for (k, stencil) in self.stencils.iter().enumerate() {
+            let mut force = -Vector3::z();
+            let mut torque = Vector3::zeros();
+            for &(l, weight) in &stencil.wrench {
+                let p = state.base[l].position();
+                for i in 0..model.feet() {
+                    if model.layout.force(i, l).is_some() {
+                        let f = state.forces[i][l] * weight;
+                        force += f;
+                        torque += (state.foot(model, i, l).point.position - p).cross(&f);
+                    }
+                }
+            }
+            for &(j, c) in &stencil.position {
+                force -= state.base[j].position() * (c * acceleration);
+            }
+            if !stencil.turn.is_empty() {
+                let n = self.turned(model, state, k) * state.base[k].rotation().transpose();
+                torque -= skew_part(&n) * torque_scale(model);
+            }
+            for c in 0..3 {
+                out[6 * k + c] = force[c];
+                out[6 * k + 3 + c] = torque[c];
+            }
+        }
+    }
+
+    fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
+        let layout = &model.layout;
+        let acceleration = 1.0 / (layout.time_step.powi(2) * GRAVITY);
+        let scale = torque_scale(model);
+        for (k, stencil) in self.stencils.iter().enumerate() {
+            let row = first + 6 * k;
+            for &(l, weight) in &stencil.wrench {
+                let base = &state.base[l];
+                let mut total = Vector3::zeros();
+                for i in 0..model.feet() {
+                    let Some((j, force_node)) = layout.force(i, l) else { continue };
+                    let contact = &state.contacts[i][j];
+                    let (f, arm) = (state.forces[i][l] * weight, contact.point.position - base.position());
+                    total += f;
+                    let foothold = &layout.feet[i].stances[j].foothold;
+                    let by_force = Tangent::force(model, contact, force_node);
+                    let warped = state.warped_forces[i][l];
+                    let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &warped);
+                    let position = Tangent::position(model, &contact.point, foothold);
+                    let (arm_form, force_form) = (cross_matrix(&arm) * weight, -cross_matrix(&f));
+                    for c in 0..3 {
+                        by_force.component(row + c, c, weight, sink);
+                        by_foothold.component(row + c, c, weight, sink);
+                        let by_f = arm_form.row(c).transpose();
+                        by_force.row(row + 3 + c, &by_f, sink);
+                        by_foothold.row(row + 3 + c, &by_f, sink);
+                        position.row(row + 3 + c, &force_form.row(c).transpose(), sink);
+                    }
+                }
+                let position = Tangent::position(model, &base.point, &layout.base[l]);
+                let form = cross_matrix(&total);
+                for c in 0..3 {
+                    position.row(row + 3 + c, &form.row(c).transpose(), sink);
+                }
+            }
+            for &(j, coefficient) in &stencil.position {
+                let position = Tangent::position(model, &state.base[j].point, &layout.base[j]);
+                for c in 0..3 {
+                    position.component(row + c, c, -coefficient * acceleration, sink);
+                }
+            }
+            if stencil.turn.is_empty() {
+                continue;
+            }
+            // axis([δ]G + Gᵀ[δ]) = (tr G 1 − G) δ, with G = c' R_j S Rᵀ; and for R itself −(tr N 1 − Nᵀ) δ.
+            let r_t = state.base[k].rotation().transpose();
+            for &(j, coefficient) in &stencil.turn {
+                let g = state.base[j].rotation() * model.second_moment * r_t * (coefficient * scale);
+                let form = g - Matrix3::identity() * g.trace();
+                let turn = Tangent::turn(model, &state.base[j], &layout.base[j]);
+                for c in 0..3 {
+                    turn.row(row + 3 + c, &form.row(c).transpose(), sink);
+                }
+            }
+            let n = self.turned(model, state, k) * r_t * scale;
+            let form = Matrix3::identity() * n.trace() - n.transpose();
+            let turn = Tangent::turn(model, &state.base[k], &layout.base[k]);
+            for c in 0..3 {
+                turn.row(row + 3 + c, &form.row(c).transpose(), sink);
+            }
+        }
+    }
+
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        multipliers: &[f64],
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
+        let layout = &model.layout;
+        let acceleration = 1.0 / (layout.time_step.powi(2) * GRAVITY);
+        for (k, stencil) in self.stencils.iter().enumerate() {
+            let force = Vector3::from_column_slice(&multipliers[6 * k..6 * k + 3]);
+            let torque = Vector3::from_column_slice(&multipliers[6 * k + 3..6 * k + 6]);
+            for &(j, c) in &stencil.position {
+                curvature.base_position[j] -= force * (c * acceleration);
+            }
+            if stencil.turn.is_empty() {
+                continue;
+            }
+            // λ · axis(N − Nᵀ) = ⟨N, [λ]⟩, bilinear in R_j and R.
+            let lambda = cross_matrix(&(torque * -torque_scale(model)));
+            let r = state.base[k].rotation();
+            let this = Tangent::turn(model, &state.base[k], &layout.base[k]);
+            curvature.base_rotation[k] += lambda.transpose() * self.turned(model, state, k);
+            for &(j, c) in &stencil.turn {
+                let other = state.base[j].rotation() * c;
+                curvature.base_rotation[j] += lambda * r * model.second_moment * c;
+                // ∂²⟨[a] G [b]ᵀ, [λ]⟩ for turns a of R_j and b of R, G = c' R_j S Rᵀ.
+                let g = other * model.second_moment * r.transpose();
+                let form = Matrix3::from_fn(|a, b| {
+                    let unit = |i: usize| cross_matrix(&Vector3::from_fn(|r, _| f64::from(u8::from(r == i))));
+                    -(unit(a) * g * unit(b)).dot(&lambda)
+                });
+                Tangent::turn(model, &state.base[j], &layout.base[j]).cross(&form, &this, sink);
+            }
+        }
+        for l in 0..self.stencils.len() {
+            let (by_force, by_torque) = self.wrench_multipliers(multipliers, l);
+            let base = &state.base[l];
+            let base_position = Tangent::position(model, &base.point, &layout.base[l]);
+            let form = -cross_matrix(&by_torque);
+            for i in 0..model.feet() {
+                let Some((j, force_node)) = layout.force(i, l) else { continue };
+                let contact = &state.contacts[i][j];
+                let (f, arm) = (state.forces[i][l], contact.point.position - base.position());
+                // λ · (r × f): ∂/∂r = f × λ, ∂/∂f = λ × r, ∂²/∂r∂f = −[λ].
+                let by_arm = f.cross(&by_torque);
+                curvature.contacts[i][j] += by_arm;
+                curvature.base_position[l] -= by_arm;
+                curvature.forces[i][l] += by_force + by_torque.cross(&arm);
+                let foothold = &layout.feet[i].stances[j].foothold;
+                let position = Tangent::position(model, &contact.point, foothold);
+                for force in [
+                    Tangent::force(model, contact, force_node),
+                    Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][l]),
+                ] {
+                    position.cross(&form, &force, sink);
+                    base_position.cross(&-form, &force, sink);
+                }
+            }
+        }
+    }
+
+    fn place(&self, row: usize) -> Place {
+        Place { foot: None, sample: (row / 6) as f64 }
+    }
+}

@@ -1,0 +1,135 @@
+//! Eq. 4 and 10: every foot stays in its box 𝓡ᵢ, fixed to the base.
+//!
+//! ```text
+//!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) ≤ center + half_size
+//! ```
+//!
+//! Rows: for each place (foot, sample), x, y, z in the base frame, m.
+
+use super::{Constraint, Place};
+use crate::nlp::sink::Sink;
+use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::{Model, State};
+use crate::trajectory::rotation::cross_matrix;
+use nalgebra::Vector3;
+
+/// Feet within reach at every sample.
+#[derive(Clone, Debug)]
+pub struct Reach {
+    places: Vec<(usize, usize)>,
+    /// Taken off the box on each side, m, for what happens between the samples: (standing, swinging).
+    margin: (f64, f64),
+}
+
+impl Reach {
+    /// Every foot at every sample.
+    pub fn new(model: &Model, margin: (f64, f64)) -> Self {
+        let samples = model.layout.intervals + 1;
+        let places = (0..model.feet()).flat_map(|i| (0..samples).map(move |k| (i, k))).collect();
+        Self { places, margin }
+    }
+}
+
+/// r = Rᵀ(p_i − p) of a foot at a sample and its derivatives, also used by costs.
+pub(crate) fn say_row(
+    model: &Model,
+    state: &State,
+    (i, k): (usize, usize),
+    by: &Vector3<f64>,
+    row: usize,
+    sink: &mut Sink,
+) {
+    let (base, foot) = (&state.base[k], state.foot(model, i, k));
+    let world = base.rotation() * by;
+    let arm = foot.point.position - base.position();
+    let node = &model.layout.base[k];
+    // d(Rᵀ r) = Rᵀ ([r] δ + dp_i − dp).
+    Tangent::turn(model, base, node).row(row, &(-arm.cross(&world)), sink);
+    Tangent::position(model, &base.point, node).row(row, &-world, sink);
+    Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]).row(row, &world, sink);
+}
+
+/// Second derivatives of λ · Rᵀ(p_i − p).
+pub(crate) fn say_curvature(
+    model: &Model,
+    state: &State,
+    (i, k): (usize, usize),
+    lambda: &Vector3<f64>,
+    curvature: &mut Curvature,
+    sink: &mut Sink,
+) {
+    let (base, foot) = (&state.base[k], state.foot(model, i, k));
+    let arm = foot.point.position - base.position();
+    let world = base.rotation() * lambda;
+    curvature.base_rotation[k] += arm * lambda.transpose();
+    curvature.base_position[k] -= world;
+    curvature.add_foot(model, i, k, world);
+    // (δ × Rλ) · (dp_i − dp) = δᵀ [Rλ] (dp_i − dp).
+    let form = cross_matrix(&world);
+    let node = &model.layout.base[k];
+    let turn = Tangent::turn(model, base, node);
+    turn.cross(&form, &Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]), sink);
+    turn.cross(&-form, &Tangent::position(model, &base.point, node), sink);
+}
+
+/// r = Rᵀ(p_i − p), m.
+pub(crate) fn value(model: &Model, state: &State, (i, k): (usize, usize)) -> Vector3<f64> {
+    let base = &state.base[k];
+    base.rotation().tr_mul(&(state.foot(model, i, k).point.position - base.position()))
+}
+
+impl Constraint for Reach {
+    fn name(&self) -> &'static str {
+        "reach"
+    }
+
+    fn rows(&self) -> usize {
+        3 * self.places.len()
+    }
+
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        for (r, &(i, k)) in self.places.iter().enumerate() {
+            let reach = &model.reach[i];
+            let swings = matches!(model.layout.phase[i][k], crate::trajectory::layout::Phase::Swing(_));
+            let margin = if swings { self.margin.1 } else { self.margin.0 };
+            for c in 0..3 {
+                lower[3 * r + c] = reach.center[c] - reach.half_size[c] + margin;
+                upper[3 * r + c] = reach.center[c] + reach.half_size[c] - margin;
+            }
+        }
+    }
+
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+        for (r, &place) in self.places.iter().enumerate() {
+            out[3 * r..3 * r + 3].copy_from_slice(value(model, state, place).as_slice());
+        }
+    }
+
+    fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
+        for (r, &place) in self.places.iter().enumerate() {
+            for c in 0..3 {
+                let unit = Vector3::from_fn(|i, _| f64::from(u8::from(i == c)));
+                say_row(model, state, place, &unit, first + 3 * r + c, sink);
+            }
+        }
+    }
+
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        multipliers: &[f64],
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
+        for (r, &place) in self.places.iter().enumerate() {
+            let lambda = Vector3::from_column_slice(&multipliers[3 * r..3 * r + 3]);
+            say_curvature(model, state, place, &lambda, curvature, sink);
+        }
+    }
+
+    fn place(&self, row: usize) -> Place {
+        let (i, k) = self.places[row / 3];
+        Place { foot: Some(i), sample: k as f64 }
+    }
+}

@@ -1,0 +1,121 @@
+//! Ipopt's options, collected with their types and checked by Ipopt itself, in silence, before a solve.
+
+use super::IpoptError;
+use super::application::Application;
+
+/// What [`super::solve`] relies on: no option file, and its own value for "no bound".
+const RESERVED: [&str; 3] = [
+    "option_file_name",
+    "nlp_lower_bound_inf",
+    "nlp_upper_bound_inf",
+];
+
+/// The value of an option.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OptionValue {
+    /// For options that count.
+    Int(i32),
+    /// For tolerances and the like. Ipopt 3.11 keeps six significant digits.
+    Num(f64),
+    /// For options that choose, and yes or no.
+    Str(String),
+}
+
+/// Options for Ipopt, by the names in its manual. Of two settings of one option the later one counts.
+///
+/// ```
+/// use warpgait::ipopt::Options;
+/// let options = Options::new().set_int("max_iter", 200).set_num("tol", 1e-4).set_str("mu_strategy", "adaptive");
+/// ```
+///
+/// Where they differ from Ipopt's defaults: silent (`print_level` 0, `sb` yes), `check_derivatives_for_naninf` yes,
+/// `hessian_approximation` by whether the problem has a Hessian, `warm_start_init_point` by whether
+/// multipliers are given. All of these can be set; `option_file_name` and `nlp_…_bound_inf` cannot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    settings: Vec<(String, OptionValue)>,
+}
+
+impl Options {
+    /// Nothing set.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Sets an option that takes an integer.
+    #[must_use]
+    pub fn set_int(self, name: &str, value: i32) -> Self {
+        self.set(name, OptionValue::Int(value))
+    }
+
+    /// Sets an option that takes a number.
+    #[must_use]
+    pub fn set_num(self, name: &str, value: f64) -> Self {
+        self.set(name, OptionValue::Num(value))
+    }
+
+    /// Sets an option that takes a word.
+    #[must_use]
+    pub fn set_str(self, name: &str, value: &str) -> Self {
+        self.set(name, OptionValue::Str(value.into()))
+    }
+
+    fn set(mut self, name: &str, value: OptionValue) -> Self {
+        self.settings.retain(|(known, _)| known != name);
+        self.settings.push((name.into(), value));
+        self
+    }
+
+    /// The value of an option, if it was set.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&OptionValue> {
+        self.settings
+            .iter()
+            .find(|(known, _)| known == name)
+            .map(|(_, value)| value)
+    }
+
+    /// Hands every setting to Ipopt, which must have been silenced before.
+    ///
+    /// # Errors
+    /// The first setting that Ipopt, or this interface, does not accept.
+    pub(super) fn apply(
+        &self,
+        application: &mut Application,
+        has_hessian: bool,
+        warm_start: bool,
+    ) -> Result<(), IpoptError> {
+        let wants_exact =
+            self.get("hessian_approximation") == Some(&OptionValue::Str("exact".into()));
+        if wants_exact && !has_hessian {
+            return Err(IpoptError::NoHessian);
+        }
+        let defaults = Self::new()
+            .set_str("check_derivatives_for_naninf", "yes")
+            .set_str(
+                "hessian_approximation",
+                if has_hessian {
+                    "exact"
+                } else {
+                    "limited-memory"
+                },
+            )
+            .set_str(
+                "warm_start_init_point",
+                if warm_start { "yes" } else { "no" },
+            );
+        for (name, value) in defaults.settings.iter().chain(&self.settings) {
+            if RESERVED.contains(&name.as_str()) {
+                return Err(IpoptError::OptionReserved(name.clone()));
+            }
+            if !application.set_option(name, value) {
+                return Err(IpoptError::OptionRejected {
+                    name: name.clone(),
+                    value: value.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,152 @@
+//! Analytic derivatives against central differences, block by block: in the tests, and for users as `--check-derivatives`.
+
+use serde::Serialize;
+
+use super::problem::Problem;
+use crate::ipopt::NlpProblem;
+
+/// The largest disagreement within one block.
+#[derive(Clone, Debug, Serialize)]
+pub struct DerivativeError {
+    /// Name of the block, or of a cost, or `hessian`.
+    pub block: String,
+    /// Largest |analytic − difference| / max(1, |difference|).
+    pub largest: f64,
+    /// Row within the block, and variable.
+    pub place: String,
+    /// Entries that differences find but the pattern lacks.
+    pub missing: usize,
+}
+
+/// Step of the central differences.
+const STEP: f64 = 1e-5;
+/// A difference larger than this, where the pattern has no entry, is a missing entry.
+const NOISE: f64 = 1e-6;
+
+/// Compares all first derivatives at x, and the second ones if the problem has them, in the directions of `variables`.
+pub fn check(problem: &mut Problem, x: &[f64], variables: &[usize]) -> Vec<DerivativeError> {
+    let (rows, columns) = {
+        let (r, c) = problem.jacobian_structure();
+        (r.to_vec(), c.to_vec())
+    };
+    let m = problem.num_constraints();
+    // Poisoned: an entry that is not written shows.
+    let mut values = vec![f64::NAN; rows.len()];
+    problem.jacobian_values(x, true, &mut values);
+    let n = problem.num_variables();
+    let mut gradient = vec![f64::NAN; n];
+    problem.gradient(x, true, &mut gradient);
+
+    let names: Vec<(String, usize)> =
+        problem.blocks().map(|(b, first)| (b.name().to_string(), first)).collect();
+    let block_of = |row: usize| names.iter().rposition(|(_, first)| *first <= row).unwrap_or(0);
+    let mut errors: Vec<DerivativeError> = names
+        .iter()
+        .map(|(name, _)| name.clone())
+        .chain(["cost".into()])
+        .map(|block| DerivativeError { block, largest: 0.0, place: String::new(), missing: 0 })
+        .collect();
+
+    let mut moved = x.to_vec();
+    let (mut plus, mut minus) = (vec![f64::NAN; m], vec![f64::NAN; m]);
+    let cost = names.len();
+    for &v in variables {
+        let mut column = vec![None; m];
+        for (slot, (&r, &c)) in rows.iter().zip(&columns).enumerate() {
+            if c as usize == v {
+                column[r as usize] = Some(values[slot]);
+            }
+        }
+        moved[v] = x[v] + STEP;
+        problem.constraints(&moved, true, &mut plus);
+        let up = problem.objective(&moved, false);
+        moved[v] = x[v] - STEP;
+        problem.constraints(&moved, true, &mut minus);
+        let down = problem.objective(&moved, false);
+        moved[v] = x[v];
+        let name = problem.variable_name(v);
+        for row in 0..m {
+            let difference = (plus[row] - minus[row]) / (2.0 * STEP);
+            let b = block_of(row);
+            match column[row] {
+                Some(value) => {
+                    note(&mut errors[b], value, difference, || format!("row {}, {name}", row - names[b].1))
+                }
+                None if difference.abs() > NOISE => errors[b].missing += 1,
+                None => {}
+            }
+        }
+        note(&mut errors[cost], gradient[v], (up - down) / (2.0 * STEP), || name.clone());
+    }
+    if problem.hessian_structure().is_some() {
+        errors.push(check_hessian(problem, x, variables));
+    }
+    errors
+}
+
+/// The Hessian of the Lagrangian with fixed arbitrary multipliers against differences of its gradient.
+fn check_hessian(problem: &mut Problem, x: &[f64], variables: &[usize]) -> DerivativeError {
+    let mut error =
+        DerivativeError { block: "hessian".into(), largest: 0.0, place: String::new(), missing: 0 };
+    let Some((rows, columns)) = problem.hessian_structure().map(|(r, c)| (r.to_vec(), c.to_vec())) else {
+        return error;
+    };
+    let (n, m) = (problem.num_variables(), problem.num_constraints());
+    let multipliers: Vec<f64> = (0..m).map(|r| (1.0 + r as f64 * 0.7).sin()).collect();
+    let factor = 0.8;
+    let mut values = vec![f64::NAN; rows.len()];
+    problem.hessian_values(x, true, factor, &multipliers, true, &mut values);
+    let (jacobian_rows, jacobian_columns) = {
+        let (r, c) = problem.jacobian_structure();
+        (r.to_vec(), c.to_vec())
+    };
+    let mut jacobian = vec![f64::NAN; jacobian_rows.len()];
+    let mut lagrangian = |problem: &mut Problem, x: &[f64]| -> Vec<f64> {
+        let mut gradient = vec![f64::NAN; n];
+        problem.gradient(x, true, &mut gradient);
+        gradient.iter_mut().for_each(|g| *g *= factor);
+        problem.jacobian_values(x, false, &mut jacobian);
+        for (slot, (&r, &c)) in jacobian_rows.iter().zip(&jacobian_columns).enumerate() {
+            gradient[c as usize] += multipliers[r as usize] * jacobian[slot];
+        }
+        gradient
+    };
+    let mut moved = x.to_vec();
+    for &v in variables {
+        let mut column = vec![None; n];
+        for (slot, (&r, &c)) in rows.iter().zip(&columns).enumerate() {
+            if c as usize == v {
+                column[r as usize] = Some(values[slot]);
+            } else if r as usize == v {
+                column[c as usize] = Some(values[slot]);
+            }
+        }
+        moved[v] = x[v] + STEP;
+        let plus = lagrangian(problem, &moved);
+        moved[v] = x[v] - STEP;
+        let minus = lagrangian(problem, &moved);
+        moved[v] = x[v];
+        for u in 0..n {
+            let difference = (plus[u] - minus[u]) / (2.0 * STEP);
+            match column[u] {
+                Some(value) => note(&mut error, value, difference, || {
+                    format!("{} × {}", problem.variable_name(u), problem.variable_name(v))
+                }),
+                None if difference.abs() > NOISE * 10.0 => error.missing += 1,
+                None => {}
+            }
+        }
+    }
+    error
+}
+
+fn note(error: &mut DerivativeError, value: f64, difference: f64, place: impl FnOnce() -> String) {
+    let mut size = (value - difference).abs() / difference.abs().max(1.0);
+    if size.is_nan() {
+        size = f64::INFINITY;
+    }
+    if size > error.largest {
+        error.largest = size;
+        error.place = place();
+    }
+}

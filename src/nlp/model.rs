@@ -1,0 +1,93 @@
+//! What stays the same during a solve.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::heightfield::Heightfield;
+use crate::robot::{Box3, Robot};
+use crate::scenario::Scenario;
+use crate::trajectory::space::Space;
+use crate::trajectory::{Gait, Layout};
+use crate::{Error, Result};
+
+/// m/s².
+pub const GRAVITY: f64 = 9.81;
+
+/// Rounds the tip of the friction cone, in m g: ‖f_t‖ becomes √(‖f_t‖² + ε²) − ε.
+pub const CONE_ROUNDING: f64 = 1e-3;
+
+/// Points of the torso's underside at which its clearance is asked for, along x and y.
+pub const UNDERSIDE: [usize; 2] = [5, 3];
+
+/// Robot, ground, space and layout. Units of the NLP: m, s, forces in m g, torques in m g · 1 m.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// kg.
+    pub mass: f64,
+    /// S = ½ tr(I) 1 − I, kg m²: the second moment of the mass, ∫ρ x xᵀ.
+    pub second_moment: Matrix3<f64>,
+    /// By foot, base frame, m.
+    pub nominal: Vec<Vector3<f64>>,
+    /// By foot.
+    pub reach: Vec<Box3>,
+    /// By foot.
+    pub foot_names: Vec<String>,
+    /// By foot.
+    pub adhesive: Vec<bool>,
+    /// Points of the torso's underside, base frame, m.
+    pub underside: Vec<Vector3<f64>>,
+    /// The ground.
+    pub ground: Arc<Heightfield>,
+    /// The space of the variables.
+    pub space: Space,
+    /// The variables.
+    pub layout: Layout,
+}
+
+impl Model {
+    /// Puts a scenario together.
+    pub fn new(scenario: &Scenario, robot: &Robot, ground: Arc<Heightfield>, space: Space) -> Result<Self> {
+        let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
+        let gait = Gait::new(scenario, &foot_names)?;
+        let adhesive_feet = &scenario.robot.adhesive_feet;
+        if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
+            return Err(Error::input(format!(
+                "robot.adhesive_feet: \"{unknown}\" is no foot of {}; its feet are {}",
+                robot.name,
+                foot_names.join(", ")
+            )));
+        }
+        let inertia = Matrix3::from_fn(|r, c| robot.inertia[r][c]);
+        let along = |i: usize, count: usize| 2.0 * i as f64 / (count - 1) as f64 - 1.0;
+        let (center, half) = (robot.torso.center, robot.torso.half_size);
+        let underside = (0..UNDERSIDE[0])
+            .flat_map(|i| {
+                (0..UNDERSIDE[1]).map(move |j| {
+                    Vector3::new(
+                        center[0] + half[0] * along(i, UNDERSIDE[0]),
+                        center[1] + half[1] * along(j, UNDERSIDE[1]),
+                        center[2] - half[2],
+                    )
+                })
+            })
+            .collect();
+        Ok(Self {
+            mass: robot.mass,
+            second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
+            nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
+            reach: robot.feet.iter().map(|f| f.reach).collect(),
+            adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
+            foot_names,
+            underside,
+            ground,
+            space,
+            layout: Layout::new(&gait, scenario.time_step),
+        })
+    }
+
+    /// Number of feet.
+    pub fn feet(&self) -> usize {
+        self.nominal.len()
+    }
+}

@@ -1,0 +1,348 @@
+//! The one place where the problem is composed: variables with bounds, constraint blocks, costs, and their sparse derivatives.
+
+use crate::constraints::Constraint;
+use crate::constraints::base_clearance::BaseClearance;
+use crate::constraints::dynamics::Dynamics;
+use crate::constraints::foothold_slope::FootholdSlope;
+use crate::constraints::friction::Friction;
+use crate::constraints::friction_conformal::FrictionConformal;
+use crate::constraints::goal::Goal;
+use crate::constraints::normal_force::NormalForce;
+use crate::constraints::reach::Reach;
+use crate::constraints::stance::OnGround;
+use crate::constraints::swing::SwingClearance;
+use crate::costs::Cost;
+use crate::costs::posture::Posture;
+use crate::costs::smoothness::Smoothness;
+use crate::ipopt::NlpProblem;
+use crate::scenario::{Cone, Law, Scenario};
+use crate::trajectory::spline::SWING_CONTROL_POINTS;
+
+use super::model::Model;
+use super::sink::{Pattern, Sink};
+use super::state::{Curvature, State};
+
+/// Taken off the reach boxes, m, so that they hold between the samples: (standing, swinging).
+const REACH_MARGIN: (f64, f64) = (0.001, 0.004);
+/// Asked for beyond `base_clearance`, m, so that it holds between the points and samples that are looked at.
+const CLEARANCE_MARGIN: f64 = 0.01;
+/// Weight of the swings' acceleration, of that of the base's.
+const SWING_WEIGHT: f64 = 1e-3;
+/// Weight of the posture, of that of the base's acceleration, s⁻⁴.
+const POSTURE_WEIGHT: f64 = 100.0;
+
+/// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper.
+pub struct Problem {
+    /// What stays the same.
+    pub model: Model,
+    /// The nodes at the last x.
+    pub state: State,
+    blocks: Vec<Box<dyn Constraint>>,
+    offsets: Vec<usize>,
+    costs: Vec<Box<dyn Cost>>,
+    jacobian: Pattern,
+    gradient: Pattern,
+    hessian: Option<Pattern>,
+    curvature: Curvature,
+    gradient_values: Vec<f64>,
+    /// The last x, and whether the second derivatives of the nodes are there.
+    evaluated: Vec<f64>,
+    curved: bool,
+    initial: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+/// What to compose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// With the costs of the scenario.
+    pub with_costs: bool,
+    /// With second derivatives.
+    pub exact_hessian: bool,
+}
+
+impl Problem {
+    /// Composes the problem of a scenario, to be started from `initial`.
+    pub fn new(scenario: &Scenario, model: Model, initial: Vec<f64>, choice: Choice) -> Self {
+        let (motion, contact) = (&scenario.motion, &scenario.contact);
+        let intervals = model.layout.intervals;
+        let mut blocks: Vec<Box<dyn Constraint>> = vec![
+            match scenario.physics.law {
+                Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
+                Law::Pcdm | Law::NewtonEuler => Box::new(Dynamics::centred(intervals)),
+            },
+            Box::new(Reach::new(&model, REACH_MARGIN)),
+            match contact.cone {
+                Cone::Exact => Box::new(Friction::new(&model, contact.friction)),
+                Cone::Conformal => Box::new(FrictionConformal::new(&model, contact.friction)),
+            },
+            Box::new(NormalForce::new(&model, motion.force_limit, motion.pull_limit)),
+            Box::new(OnGround::new(&model)),
+            Box::new(SwingClearance::new(&model, motion.swing_clearance)),
+            Box::new(BaseClearance::new(&model, motion.base_clearance + CLEARANCE_MARGIN)),
+            Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
+        ];
+        if let Some(max_slope) = contact.max_slope {
+            blocks.push(Box::new(FootholdSlope::new(&model, max_slope)));
+        }
+        let [base, force] = motion.smoothness;
+        let mut costs: Vec<Box<dyn Cost>> = Vec::new();
+        if choice.with_costs && base > 0.0 {
+            costs.push(Box::new(Smoothness::base_acceleration(&model, base)));
+            costs.push(Box::new(Smoothness::swing_acceleration(&model, SWING_WEIGHT * base)));
+            costs.push(Box::new(Posture::new(&model, POSTURE_WEIGHT * base)));
+        }
+        if choice.with_costs && force > 0.0 {
+            costs.push(Box::new(Smoothness::force_rate(&model, force)));
+        }
+        Self::compose(model, blocks, costs, initial, choice.exact_hessian)
+    }
+
+    /// A problem of given blocks.
+    pub fn compose(
+        model: Model,
+        blocks: Vec<Box<dyn Constraint>>,
+        costs: Vec<Box<dyn Cost>>,
+        initial: Vec<f64>,
+        exact_hessian: bool,
+    ) -> Self {
+        let mut offsets = vec![0];
+        for block in &blocks {
+            offsets.push(offsets[offsets.len() - 1] + block.rows());
+        }
+        let mut state = State::new(&model);
+        state.update(&model, &initial, exact_hessian);
+        let jacobian = Pattern::record(|sink| {
+            for (block, &first) in blocks.iter().zip(&offsets) {
+                block.jacobian(&model, &state, first, sink);
+            }
+        });
+        let gradient = Pattern::record(|sink| {
+            for cost in &costs {
+                cost.gradient(&model, &state, &initial, sink);
+            }
+        });
+        let mut curvature = Curvature::new(&state);
+        let hessian = exact_hessian.then(|| {
+            let multipliers = vec![1.0; offsets[blocks.len()]];
+            Pattern::record(|sink| {
+                say_hessian(
+                    &model,
+                    &state,
+                    &blocks,
+                    &offsets,
+                    &costs,
+                    1.0,
+                    &multipliers,
+                    &mut curvature,
+                    sink,
+                );
+            })
+        });
+        let (lower, upper) = variable_bounds(&model, &initial);
+        Self {
+            gradient_values: vec![0.0; gradient.len()],
+            evaluated: initial.clone(),
+            curved: exact_hessian,
+            model,
+            state,
+            blocks,
+            offsets,
+            costs,
+            jacobian,
+            gradient,
+            hessian,
+            curvature,
+            initial,
+            lower,
+            upper,
+        }
+    }
+
+    /// The constraint blocks with the number of their first row.
+    pub fn blocks(&self) -> impl Iterator<Item = (&dyn Constraint, usize)> {
+        self.blocks.iter().map(|b| &**b as &dyn Constraint).zip(self.offsets.iter().copied())
+    }
+
+    /// The costs.
+    pub fn costs(&self) -> impl Iterator<Item = &dyn Cost> {
+        self.costs.iter().map(|c| &**c as &dyn Cost)
+    }
+
+    /// Evaluates the nodes at x, unless they are there.
+    pub fn update(&mut self, x: &[f64], curved: bool) {
+        if (curved && !self.curved) || self.evaluated != x {
+            self.state.update(&self.model, x, curved);
+            self.evaluated.copy_from_slice(x);
+            self.curved = curved;
+        }
+    }
+
+    /// Name of a variable, for messages.
+    pub fn variable_name(&self, v: usize) -> String {
+        let layout = &self.model.layout;
+        let axis = |d: usize| ["x", "y", "z", "roll", "pitch", "yaw"][d];
+        if v < 6 * layout.base_blocks {
+            return format!("base control point {} {}", v / 6, axis(v % 6));
+        }
+        for (name, foot) in self.model.foot_names.iter().zip(&layout.feet) {
+            for (j, stance) in foot.stances.iter().enumerate() {
+                if (0..3).any(|d| stance.foothold.first() + d == v) {
+                    return format!("{name} foothold {j} {}", axis(v - stance.foothold.first()));
+                }
+                if let Some((k, f)) = stance.free_forces().find(|(_, f)| (0..3).any(|d| f.first() + d == v)) {
+                    return format!(
+                        "{name} force at {:.3} s {}",
+                        k as f64 * layout.time_step,
+                        axis(v - f.first())
+                    );
+                }
+            }
+            for (j, swing) in foot.swings.iter().enumerate() {
+                if (swing.control_points..swing.control_points + 3 * SWING_CONTROL_POINTS).contains(&v) {
+                    return format!("{name} swing {j} control point {}", (v - swing.control_points) / 3);
+                }
+            }
+        }
+        format!("variable {v}")
+    }
+}
+
+/// The base's first control points are pinned; in F, the free control points of a swing stay above the ground: z̄ ≥ 0 holds for a
+/// spline whose control points obey it (Eq. 8, second line, at every instant).
+fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
+    let mut upper = vec![f64::INFINITY; model.layout.variables];
+    lower[..6].copy_from_slice(&initial[..6]);
+    upper[..6].copy_from_slice(&initial[..6]);
+    if model.space.is_warped() {
+        for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
+            for c in 0..SWING_CONTROL_POINTS {
+                lower[swing.control_points + 3 * c + 2] = 0.0;
+            }
+        }
+    }
+    (lower, upper)
+}
+
+#[allow(clippy::too_many_arguments)] // the parts of one problem, borrowed apart
+fn say_hessian(
+    model: &Model,
+    state: &State,
+    blocks: &[Box<dyn Constraint>],
+    offsets: &[usize],
+    costs: &[Box<dyn Cost>],
+    factor: f64,
+    multipliers: &[f64],
+    curvature: &mut Curvature,
+    sink: &mut Sink,
+) {
+    curvature.clear();
+    for (block, &first) in blocks.iter().zip(offsets) {
+        block.hessian(model, state, &multipliers[first..first + block.rows()], curvature, sink);
+    }
+    for cost in costs {
+        cost.hessian(model, state, factor, curvature, sink);
+    }
+    curvature.say(model, state, sink);
+}
+
+impl NlpProblem for Problem {
+    fn num_variables(&self) -> usize {
+        self.model.layout.variables
+    }
+
+    fn num_constraints(&self) -> usize {
+        self.offsets[self.blocks.len()]
+    }
+
+    fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        lower.copy_from_slice(&self.lower);
+        upper.copy_from_slice(&self.upper);
+    }
+
+    fn constraint_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        for (block, &first) in self.blocks.iter().zip(&self.offsets) {
+            let rows = first..first + block.rows();
+            block.bounds(&self.model, &mut lower[rows.clone()], &mut upper[rows]);
+        }
+    }
+
+    fn initial_point(&self, x: &mut [f64]) {
+        x.copy_from_slice(&self.initial);
+    }
+
+    fn objective(&mut self, x: &[f64], _new_x: bool) -> f64 {
+        self.update(x, false);
+        self.costs.iter().map(|cost| cost.value(&self.model, &self.state, x)).sum()
+    }
+
+    fn gradient(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
+        self.update(x, false);
+        let (model, state, costs) = (&self.model, &self.state, &self.costs);
+        self.gradient.fill(&mut self.gradient_values, |sink| {
+            for cost in costs {
+                cost.gradient(model, state, x, sink);
+            }
+        });
+        out.fill(0.0);
+        for (&column, &value) in self.gradient.columns.iter().zip(&self.gradient_values) {
+            out[column as usize] = value;
+        }
+    }
+
+    fn constraints(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
+        self.update(x, false);
+        for (block, &first) in self.blocks.iter().zip(&self.offsets) {
+            block.values(&self.model, &self.state, &mut out[first..first + block.rows()]);
+        }
+    }
+
+    fn jacobian_structure(&self) -> (&[i32], &[i32]) {
+        (&self.jacobian.rows, &self.jacobian.columns)
+    }
+
+    fn jacobian_values(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
+        self.update(x, false);
+        let (model, state, blocks, offsets) = (&self.model, &self.state, &self.blocks, &self.offsets);
+        self.jacobian.fill(out, |sink| {
+            for (block, &first) in blocks.iter().zip(offsets) {
+                block.jacobian(model, state, first, sink);
+            }
+        });
+    }
+
+    fn hessian_structure(&self) -> Option<(&[i32], &[i32])> {
+        self.hessian.as_ref().map(|h| (&h.rows[..], &h.columns[..]))
+    }
+
+    fn hessian_values(
+        &mut self,
+        x: &[f64],
+        _new_x: bool,
+        objective_factor: f64,
+        multipliers: &[f64],
+        _new_multipliers: bool,
+        out: &mut [f64],
+    ) {
+        self.update(x, true);
+        let (model, state, blocks, offsets) = (&self.model, &self.state, &self.blocks, &self.offsets);
+        let (costs, curvature) = (&self.costs, &mut self.curvature);
+        if let Some(hessian) = &self.hessian {
+            hessian.fill(out, |sink| {
+                say_hessian(
+                    model,
+                    state,
+                    blocks,
+                    offsets,
+                    costs,
+                    objective_factor,
+                    multipliers,
+                    curvature,
+                    sink,
+                );
+            });
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Where constraints and costs put their derivatives.
+//!
+//! A block says each derivative once, as (row, variable, value). The first time the places are recorded and become the
+//! sparsity pattern; ever after the same calls, in the same order, add their values to the stored slots. So the
+//! pattern and the values cannot drift apart.
+
+use crate::trajectory::LinearNode;
+
+/// Sorted unique places of a sparse matrix, and for each entry said, in order, the slot it belongs to.
+#[derive(Clone, Debug, Default)]
+pub struct Pattern {
+    /// Row of each slot.
+    pub rows: Vec<i32>,
+    /// Column of each slot.
+    pub columns: Vec<i32>,
+    slots: Vec<u32>,
+}
+
+impl Pattern {
+    /// Records what `say` says into a sink.
+    pub fn record(say: impl FnOnce(&mut Sink)) -> Self {
+        let mut sink = Sink { places: Vec::new(), slots: &[], cursor: 0, values: &mut [] };
+        say(&mut sink);
+        let places = sink.places;
+        let mut unique = places.clone();
+        unique.sort_unstable();
+        unique.dedup();
+        let slots = places
+            .iter()
+            .map(|place| unique.binary_search(place).expect("every place is among the unique ones") as u32)
+            .collect();
+        Self {
+            rows: unique.iter().map(|p| p.0 as i32).collect(),
+            columns: unique.iter().map(|p| p.1 as i32).collect(),
+            slots,
+        }
+    }
+
+    /// Number of slots.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Fills `values`, one for each slot, with what `say` says this time.
+    pub fn fill(&self, values: &mut [f64], say: impl FnOnce(&mut Sink)) {
+        values.fill(0.0);
+        let mut sink = Sink { places: Vec::new(), slots: &self.slots, cursor: 0, values };
+        say(&mut sink);
+        assert_eq!(sink.cursor, self.slots.len(), "a block said other places than it had declared");
+    }
+}
+
+/// Takes derivatives. Either records places or adds values.
+pub struct Sink<'a> {
+    places: Vec<(u32, u32)>,
+    slots: &'a [u32],
+    cursor: usize,
+    values: &'a mut [f64],
+}
+
+impl Sink<'_> {
+    /// Adds `value` at (row, column).
+    #[inline]
+    pub fn add(&mut self, row: usize, column: usize, value: f64) {
+        if self.values.is_empty() {
+            self.places.push((row as u32, column as u32));
+        } else {
+            self.values[self.slots[self.cursor] as usize] += value;
+            self.cursor += 1;
+        }
+    }
+
+    /// Adds the derivative `value` of a row with respect to component `d` of a node.
+    #[inline]
+    pub fn node(&mut self, row: usize, node: &LinearNode, d: usize, value: f64) {
+        for &(variable, weight) in &node.terms {
+            self.add(row, variable + d, weight * value);
+        }
+    }
+
+    /// Adds the second derivative `value` with respect to component `a` of one node and component `b` of another *and* its
+    /// mirror image, to the lower triangle. For the two halves of one node's own block say each unordered pair once.
+    #[inline]
+    pub fn pair(&mut self, (node_a, a): (&LinearNode, usize), (node_b, b): (&LinearNode, usize), value: f64) {
+        for &(variable_a, weight_a) in &node_a.terms {
+            for &(variable_b, weight_b) in &node_b.terms {
+                let (u, v) = (variable_a + a, variable_b + b);
+                let value = weight_a * weight_b * value;
+                self.add(u.max(v), u.min(v), if u == v { 2.0 * value } else { value });
+            }
+        }
+    }
+
+    /// Adds the second derivative `value` with respect to components `a` and `b` of one and the same node, a ≥ b, once for
+    /// each unordered pair (a, b), to the lower triangle.
+    #[inline]
+    pub fn own(&mut self, node: &LinearNode, a: usize, b: usize, value: f64) {
+        if a == b {
+            for (s, &(variable_s, weight_s)) in node.terms.iter().enumerate() {
+                for &(variable_t, weight_t) in &node.terms[..=s] {
+                    let (u, v) = (variable_s + a, variable_t + a);
+                    self.add(u.max(v), u.min(v), weight_s * weight_t * value);
+                }
+            }
+        } else {
+            self.pair((node, a), (node, b), value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_land_where_they_were_declared() {
+        let say = |scale: f64| {
+            move |sink: &mut Sink| {
+                sink.add(1, 2, scale);
+                sink.add(0, 0, 2.0 * scale);
+                sink.add(1, 2, 3.0 * scale);
+            }
+        };
+        let pattern = Pattern::record(say(1.0));
+        assert_eq!((&pattern.rows[..], &pattern.columns[..]), (&[0, 1][..], &[0, 2][..]));
+        let mut values = [f64::NAN; 2];
+        pattern.fill(&mut values, say(10.0));
+        assert_eq!(values, [20.0, 40.0]);
+    }
+
+    /// f = (Σ w x)ᵀ A (Σ w x) has the Hessian W (A + Aᵀ) Wᵀ; said by `own`, its lower triangle.
+    #[test]
+    fn a_node_with_shared_variables_gives_the_whole_hessian() {
+        let node = LinearNode { terms: vec![(0, 0.25), (2, 0.75)] };
+        let h = [[2.0, 0.5], [0.5, 3.0]];
+        let say = |sink: &mut Sink| {
+            for a in 0..2 {
+                for b in 0..=a {
+                    sink.own(&node, a, b, h[a][b]);
+                }
+            }
+        };
+        let pattern = Pattern::record(say);
+        let mut values = vec![f64::NAN; pattern.len()];
+        pattern.fill(&mut values, say);
+        let w = [0.25, 0.25, 0.75, 0.75];
+        let d = [0, 1, 0, 1];
+        let mut seen = 0;
+        for (slot, value) in values.iter().enumerate() {
+            let (i, j) = (pattern.rows[slot] as usize, pattern.columns[slot] as usize);
+            assert!(i >= j);
+            assert!((value - w[i] * w[j] * h[d[i]][d[j]]).abs() < 1e-15, "({i}, {j})");
+            seen += 1;
+        }
+        assert_eq!(seen, 10);
+    }
+}

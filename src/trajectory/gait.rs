@@ -1,0 +1,221 @@
+//! Which foot stands when. Switches lie on the grid of samples, so that piecewise linear forces have their kinks where
+//! the base's acceleration has its own.
+
+use crate::scenario::{GaitKind, Scenario};
+use crate::{Error, Result};
+
+/// Standing at the start and at the end, s.
+const STAND: f64 = 0.3;
+
+/// A time during which a foot stands, in samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stance {
+    /// First sample, touch-down (force zero, unless the motion starts here).
+    pub start: usize,
+    /// Last sample, lift-off (force zero, unless the motion ends here).
+    pub end: usize,
+}
+
+/// A time during which a foot moves, in samples; both ends belong to a stance as well.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Swing {
+    /// Lift-off.
+    pub start: usize,
+    /// Touch-down.
+    pub end: usize,
+}
+
+/// Swings by foot, in order of time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gait {
+    /// Intervals of the sample grid.
+    pub intervals: usize,
+    /// By foot.
+    pub swings: Vec<Vec<Swing>>,
+}
+
+impl Gait {
+    /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom).
+    pub fn new(scenario: &Scenario, foot_names: &[String]) -> Result<Self> {
+        let step = scenario.time_step;
+        let intervals = (scenario.horizon / step).round() as usize;
+        let gait = &scenario.gait;
+        let feet = foot_names.len();
+        let swings = match gait.kind {
+            GaitKind::Stand => vec![Vec::new(); feet],
+            GaitKind::Custom => custom(gait.phases.as_deref(), feet, step, intervals)?,
+            kind => {
+                let (offsets, duty) = pattern(kind, foot_names)?;
+                let duty = gait.duty.unwrap_or(duty);
+                cyclic(&offsets, duty, gait.cycle, scenario.horizon, step)?
+            }
+        };
+        Ok(Self { intervals, swings })
+    }
+
+    /// The stances of a foot, in order of time: one more than its swings.
+    pub fn stances(&self, foot: usize) -> Vec<Stance> {
+        let swings = &self.swings[foot];
+        (0..=swings.len())
+            .map(|j| Stance {
+                start: if j == 0 { 0 } else { swings[j - 1].end },
+                end: if j == swings.len() { self.intervals } else { swings[j].start },
+            })
+            .collect()
+    }
+
+    /// The swing that sample `k` lies strictly inside of, if any.
+    pub fn swing_at(&self, foot: usize, k: usize) -> Option<usize> {
+        self.swings[foot].iter().position(|s| s.start < k && k < s.end)
+    }
+}
+
+/// Lift-off of each foot as a share of the cycle, and the usual duty factor.
+fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
+    let (table, duty): ([f64; 4], f64) = match kind {
+        // LH, LF, RH, RF, one foot at a time.
+        GaitKind::Walk => ([0.25, 0.75, 0.0, 0.5], 0.75),
+        GaitKind::Trot => ([0.0, 0.5, 0.5, 0.0], 0.6),
+        GaitKind::Pace => ([0.0, 0.5, 0.0, 0.5], 0.6),
+        GaitKind::Bound => ([0.0, 0.0, 0.5, 0.5], 0.6),
+        GaitKind::Stand | GaitKind::Custom => unreachable!("handled by the caller"),
+    };
+    let order = ["LF", "RF", "LH", "RH"];
+    let offsets = names
+        .iter()
+        .map(|name| {
+            order.iter().position(|o| o == name).map(|i| table[i]).ok_or_else(|| {
+                Error::input(format!(
+                    "gait.kind: the shipped gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
+                ))
+            })
+        })
+        .collect::<Result<_>>()?;
+    Ok((offsets, duty))
+}
+
+/// As many whole cycles as fit between standing at the start and at the end; what is left is standing too.
+fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Result<Vec<Vec<Swing>>> {
+    let swing = ((1.0 - duty) * cycle / step).round() as usize;
+    if swing < 2 {
+        return Err(Error::input(format!(
+            "gait: a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, lower the duty or the time_step",
+            (1.0 - duty) * cycle
+        )));
+    }
+    let last = offsets.iter().fold(0.0, |a: f64, &b| a.max(b)) + (1.0 - duty);
+    // n cycles take (n - 1 + last) cycle lengths.
+    let cycles = ((horizon - 2.0 * STAND) / cycle - last + 1.0 + 1e-9).floor();
+    if cycles < 1.0 {
+        return Err(Error::input(format!(
+            "gait: not one cycle of {cycle} s fits into the horizon of {horizon} s with {STAND} s of standing at both ends; lengthen the horizon or shorten gait.cycle"
+        )));
+    }
+    let begin = (horizon - (cycles - 1.0 + last) * cycle) / 2.0;
+    Ok(offsets
+        .iter()
+        .map(|offset| {
+            (0..cycles as usize)
+                .map(|j| {
+                    let start = ((begin + (j as f64 + offset) * cycle) / step).round() as usize;
+                    Swing { start, end: start + swing }
+                })
+                .collect()
+        })
+        .collect())
+}
+
+/// Phase tables: stance and swing durations in turn, stance first and last.
+fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize) -> Result<Vec<Vec<Swing>>> {
+    let phases = phases.ok_or_else(|| {
+        Error::input("gait.phases: kind = \"custom\" needs a table of phase durations for each foot, stance first, in s")
+    })?;
+    if phases.len() != feet {
+        return Err(Error::input(format!(
+            "gait.phases: {} tables given, but the robot has {feet} feet",
+            phases.len()
+        )));
+    }
+    phases
+        .iter()
+        .enumerate()
+        .map(|(foot, durations)| {
+            if durations.len() % 2 == 0 {
+                return Err(Error::input(format!(
+                    "gait.phases[{foot}]: {} durations; an odd number is needed, for a foot stands at the start and at the end",
+                    durations.len()
+                )));
+            }
+            let mut edges = vec![0_usize];
+            let mut time = 0.0;
+            for d in durations {
+                time += d;
+                edges.push((time / step).round() as usize);
+            }
+            if edges[durations.len()] != intervals {
+                return Err(Error::input(format!(
+                    "gait.phases[{foot}]: the durations sum to {time} s, but the horizon is {} s",
+                    intervals as f64 * step
+                )));
+            }
+            for (j, pair) in edges.windows(2).enumerate() {
+                if pair[1] < pair[0] + 2 {
+                    return Err(Error::input(format!(
+                        "gait.phases[{foot}][{j}]: {} s is shorter than two time steps of {step} s",
+                        durations[j]
+                    )));
+                }
+            }
+            Ok((1..durations.len()).step_by(2).map(|j| Swing { start: edges[j], end: edges[j + 1] }).collect())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names() -> Vec<String> {
+        ["LF", "RF", "LH", "RH"].map(String::from).to_vec()
+    }
+
+    fn scenario(text: &str) -> Scenario {
+        toml::from_str(&format!(
+            "schema = 1\n{text}\n[terrain]\nkind = \"flat\"\n[start]\nposition = [0, 0]\n[goal]\nposition = [1, 0]\n"
+        ))
+        .expect("a scenario")
+    }
+
+    #[test]
+    fn a_walk_lifts_one_foot_at_a_time_and_stands_at_both_ends() {
+        let gait = Gait::new(&scenario(""), &names()).expect("a gait");
+        assert_eq!(gait.intervals, 200);
+        for k in 0..=200 {
+            let up = (0..4).filter(|&f| gait.swing_at(f, k).is_some()).count();
+            assert!(up <= 1, "sample {k}: {up} feet in the air");
+            if !(6..=194).contains(&k) {
+                assert_eq!(up, 0);
+            }
+        }
+        assert!(gait.swings.iter().all(|s| s.len() == 9 && s.iter().all(|s| s.end - s.start == 5)));
+    }
+
+    #[test]
+    fn a_trot_moves_diagonal_pairs_together() {
+        let gait = Gait::new(&scenario("[gait]\nkind = \"trot\"\ncycle = 0.8\nduty = 0.5"), &names())
+            .expect("a gait");
+        assert_eq!(gait.swings[0], gait.swings[3]);
+        assert_eq!(gait.swings[1], gait.swings[2]);
+        assert_ne!(gait.swings[0], gait.swings[1]);
+    }
+
+    #[test]
+    fn a_custom_table_must_fill_the_horizon() {
+        let ok = "[gait]\nkind = \"custom\"\nphases = [[5.0, 0.5, 4.5], [10.0], [10.0], [10.0]]";
+        let gait = Gait::new(&scenario(ok), &names()).expect("a gait");
+        assert_eq!(gait.swings[0], [Swing { start: 100, end: 110 }]);
+        assert_eq!(gait.stances(0), [Stance { start: 0, end: 100 }, Stance { start: 110, end: 200 }]);
+        let short = ok.replace("4.5", "4.0");
+        assert!(Gait::new(&scenario(&short), &names()).unwrap_err().to_string().contains("horizon"));
+    }
+}

@@ -1,0 +1,165 @@
+//! One axis of the finite element grid: a basis whose end coefficients are face values, its quadrature and its banded
+//! mass matrix.
+
+use super::basis::axis_weights;
+
+/// A quadrature or sample point on an axis: the basis functions there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// Position, in cells from the lower face.
+    pub at: f64,
+    /// Quadrature weight, m (zero for plain samples).
+    pub weight: f64,
+    /// First of the four coefficients touched.
+    pub first: usize,
+    /// Values of the basis functions.
+    pub value: [f64; 4],
+    /// Their derivatives, 1/m.
+    pub slope: [f64; 4],
+}
+
+/// Which quadrature rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rule {
+    /// Composite three-point Lobatto (Simpson): points at the knots, shared between cells, and in the middle of cells.
+    Lobatto,
+    /// Four Gauss points a cell: integrates products of the basis exactly.
+    Gauss,
+}
+
+/// N cells of one size; N + 3 coefficients, of which the first and the last are the values at the two faces.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    pub cells: usize,
+    /// Size of a cell, m.
+    pub cell: f64,
+}
+
+impl Axis {
+    /// How many coefficients.
+    pub fn len(&self) -> usize {
+        self.cells + 3
+    }
+
+    /// The basis functions at `at` (in cells, inside the box).
+    ///
+    /// At the lower face the spline has the value (ψ₀ + 4ψ₁ + ψ₂)/6. Taking this for the coefficient in place of ψ₀, that
+    /// is ψ₀ = 6u₀ − 4ψ₁ − ψ₂, leaves one coefficient that fixes the face and all others free of it; likewise above.
+    pub fn sample(&self, at: f64, weight: f64) -> Sample {
+        let w = axis_weights::<2>(at, self.cells);
+        let [mut value, mut slope] = w.weight;
+        for b in [&mut value, &mut slope] {
+            if w.first == 0 {
+                *b = [6.0 * b[0], b[1] - 4.0 * b[0], b[2] - b[0], b[3]];
+            }
+            if w.first + 1 == self.cells {
+                *b = [b[0], b[1] - b[3], b[2] - 4.0 * b[3], 6.0 * b[3]];
+            }
+        }
+        Sample { at, weight, first: w.first, value, slope: slope.map(|s| s / self.cell) }
+    }
+
+    /// The points of a composite rule over the axis.
+    pub fn quadrature(&self, rule: Rule) -> Vec<Sample> {
+        match rule {
+            Rule::Lobatto => (0..=2 * self.cells)
+                .map(|i| {
+                    let end = i == 0 || i == 2 * self.cells;
+                    let weight = if end { 1.0 / 6.0 } else { [1.0 / 3.0, 2.0 / 3.0][i % 2] };
+                    self.sample(0.5 * i as f64, weight * self.cell)
+                })
+                .collect(),
+            Rule::Gauss => {
+                let root = 1.2_f64.sqrt();
+                let outer = ((3.0 + 2.0 * root) / 7.0).sqrt();
+                let inner = ((3.0 - 2.0 * root) / 7.0).sqrt();
+                let heavy = (18.0 + 30.0_f64.sqrt()) / 72.0;
+                let rule = [(-outer, 0.5 - heavy), (-inner, heavy), (inner, heavy), (outer, 0.5 - heavy)];
+                (0..self.cells)
+                    .flat_map(|i| rule.map(|(x, w)| self.sample(i as f64 + 0.5 + 0.5 * x, w * self.cell)))
+                    .collect()
+            }
+        }
+    }
+
+    /// From control points to coefficients with face values at the ends.
+    pub fn control_to_face(&self, line: &mut [f64]) {
+        let n = line.len();
+        line[0] = (line[0] + 4.0 * line[1] + line[2]) / 6.0;
+        line[n - 1] = (line[n - 3] + 4.0 * line[n - 2] + line[n - 1]) / 6.0;
+    }
+
+    /// The way back.
+    pub fn face_to_control(&self, line: &mut [f64]) {
+        let n = line.len();
+        line[0] = 6.0 * line[0] - 4.0 * line[1] - line[2];
+        line[n - 1] = 6.0 * line[n - 1] - 4.0 * line[n - 2] - line[n - 3];
+    }
+}
+
+/// The L² projection onto the splines of one axis: u = M⁻¹ Bᵀ W f, with M = Bᵀ W B factored as a band.
+pub(super) struct Projection {
+    pub samples: Vec<Sample>,
+    /// Cholesky factor, `[row][k]` = L[row][row − 3 + k].
+    factor: Vec<[f64; 4]>,
+}
+
+impl Projection {
+    /// With four Gauss points a cell.
+    pub fn new(axis: &Axis) -> Projection {
+        let samples = axis.quadrature(Rule::Gauss);
+        let n = axis.len();
+        let mut factor = vec![[0.0; 4]; n];
+        for s in &samples {
+            for i in 0..4 {
+                for j in 0..=i {
+                    factor[s.first + i][3 + j - i] += s.weight * s.value[i] * s.value[j];
+                }
+            }
+        }
+        for row in 0..n {
+            for k in row.saturating_sub(3)..=row {
+                let mut sum = factor[row][3 + k - row];
+                for l in row.saturating_sub(3)..k {
+                    // L[k][l] is in the band whenever l ≥ k − 3, which l ≥ row − 3 implies.
+                    sum -= factor[row][3 + l - row] * factor[k][3 + l - k];
+                }
+                factor[row][3 + k - row] = if k == row { sum.sqrt() } else { sum / factor[k][3] };
+            }
+        }
+        Projection { samples, factor }
+    }
+
+    /// M⁻¹ along the slow axis of `lines`: rows of length `width`, one a coefficient.
+    pub fn solve(&self, lines: &mut [f64], width: usize) {
+        let n = self.factor.len();
+        for row in 0..n {
+            for k in row.saturating_sub(3)..row {
+                subtract_row(lines, width, row, k, self.factor[row][3 + k - row]);
+            }
+            scale_row(lines, width, row, 1.0 / self.factor[row][3]);
+        }
+        for row in (0..n).rev() {
+            for k in row + 1..(row + 4).min(n) {
+                subtract_row(lines, width, row, k, self.factor[k][3 + row - k]);
+            }
+            scale_row(lines, width, row, 1.0 / self.factor[row][3]);
+        }
+    }
+}
+
+/// Row `to` −= factor · row `from`.
+fn subtract_row(lines: &mut [f64], width: usize, to: usize, from: usize, factor: f64) {
+    let (low, high) = lines.split_at_mut(to.max(from) * width);
+    let (a, b) = (&mut low[to.min(from) * width..][..width], &mut high[..width]);
+    let (target, source) = if to < from { (a, b) } else { (b, a) };
+    for (t, s) in target.iter_mut().zip(source) {
+        *t -= factor * *s;
+    }
+}
+
+fn scale_row(lines: &mut [f64], width: usize, row: usize, factor: f64) {
+    for v in &mut lines[row * width..][..width] {
+        *v *= factor;
+    }
+}

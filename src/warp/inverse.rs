@@ -1,0 +1,138 @@
+//! φ⁻¹ by damped Newton iterations.
+
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+use super::{Order, WarpMap};
+use crate::{Error, Result};
+
+/// Residual at which a point counts as found, m.
+const TOLERANCE: f64 = 1e-11;
+const MAX_ITERATIONS: usize = 60;
+/// Steps of the continuation that is tried where Newton's method fails from the first guess.
+const CONTINUATION_STEPS: [usize; 2] = [8, 64];
+
+impl WarpMap {
+    /// x̄ with φ(x̄) = p.
+    ///
+    /// # Errors
+    /// When p is not finite, lies further from the box than the box is large, or no such x̄ is found.
+    pub fn inverse(&self, p: [f64; 3]) -> Result<[f64; 3]> {
+        self.check_near(&p)?;
+        // Over the ground at the same x, y, at the same height above it.
+        let ground = self.position([p[0], p[1], 0.0])[2];
+        let guess = Vector3::new(p[0], p[1], p[2] - ground);
+        let step = |x: &Vector3<f64>, target: &Vector3<f64>| {
+            let jet = self.jet((*x).into(), Order::First);
+            let residual = Vector3::from(jet.position) - target;
+            let jacobian = Matrix3::from_fn(|r, c| jet.jacobian[r][c]);
+            (residual.norm(), jacobian.try_inverse().map(|inverse| inverse * residual))
+        };
+        let value = |x: &Vector3<f64>| Vector3::from(self.position((*x).into()));
+        let found = solve(guess, Vector3::from(p), value, step);
+        self.checked(found.map(|x| x.into()), &p)
+    }
+
+    /// x̄, ȳ with φ_xy(x̄, ȳ, 0) = (x, y): the point of F under a point of the ground.
+    ///
+    /// # Errors
+    /// As for [`WarpMap::inverse`].
+    pub fn ground_inverse(&self, xy: [f64; 2]) -> Result<[f64; 2]> {
+        self.check_near(&xy)?;
+        let step = |x: &Vector2<f64>, target: &Vector2<f64>| {
+            let jet = self.jet([x[0], x[1], 0.0], Order::First);
+            let residual = Vector2::new(jet.position[0], jet.position[1]) - target;
+            let jacobian = Matrix2::from_fn(|r, c| jet.jacobian[r][c]);
+            (residual.norm(), jacobian.try_inverse().map(|inverse| inverse * residual))
+        };
+        let value = |x: &Vector2<f64>| {
+            let p = self.position([x[0], x[1], 0.0]);
+            Vector2::new(p[0], p[1])
+        };
+        let found = solve(Vector2::from(xy), Vector2::from(xy), value, step);
+        self.checked(found.map(|x| x.into()), &xy)
+    }
+
+    /// Refuses points that are further from the box than the box is large.
+    fn check_near<const D: usize>(&self, p: &[f64; D]) -> Result<()> {
+        let (origin, size) = (self.origin(), self.size());
+        let reach = size.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let near = |d: usize| (origin[d] - reach..=origin[d] + size[d] + reach).contains(&p[d]);
+        if (0..D).all(near) {
+            return Ok(());
+        }
+        Err(Error::input(format!(
+            "the point {p:?} m lies far outside of the warp map, which covers x {:.2} … {:.2}, y {:.2} … {:.2} m; keep to the terrain or enlarge it",
+            origin[0],
+            origin[0] + size[0],
+            origin[1],
+            origin[1] + size[1]
+        )))
+    }
+
+    fn checked<const D: usize>(&self, found: Option<[f64; D]>, p: &[f64; D]) -> Result<[f64; D]> {
+        let x = found.ok_or_else(|| {
+            Error::input(format!(
+                "no point of warped space was found that maps to {p:?} m; the warp map is folded there or does not reach it (see the map's report)"
+            ))
+        })?;
+        self.check_near(&x)?;
+        Ok(x)
+    }
+}
+
+/// Newton from the guess; where that fails, along the straight way from the guess's image to the target.
+fn solve<V: Point>(
+    guess: V,
+    target: V,
+    value: impl Fn(&V) -> V,
+    step: impl Fn(&V, &V) -> (f64, Option<V>),
+) -> Option<V> {
+    if let Some(x) = newton(guess, &target, &step) {
+        return Some(x);
+    }
+    let start = value(&guess);
+    CONTINUATION_STEPS.into_iter().find_map(|steps| {
+        let mut x = guess;
+        for i in 1..=steps {
+            let a = i as f64 / steps as f64;
+            x = newton(x, &(start * (1.0 - a) + target * a), &step)?;
+        }
+        Some(x)
+    })
+}
+
+/// Damped Newton: the step is halved until the residual falls.
+fn newton<V: Point>(mut x: V, target: &V, step: &impl Fn(&V, &V) -> (f64, Option<V>)) -> Option<V> {
+    let (mut residual, mut direction) = step(&x, target);
+    for _ in 0..MAX_ITERATIONS {
+        if residual < TOLERANCE {
+            return Some(x);
+        }
+        let towards = direction?;
+        let mut scale = 1.0;
+        loop {
+            let next = x - towards * scale;
+            let (next_residual, next_direction) = step(&next, target);
+            if next_residual < residual {
+                (x, residual, direction) = (next, next_residual, next_direction);
+                break;
+            }
+            scale *= 0.5;
+            if scale < 1e-6 {
+                // Rounding, not a wrong direction, stops it close to the solution.
+                return (residual < 100.0 * TOLERANCE).then_some(x);
+            }
+        }
+    }
+    None
+}
+
+/// What Newton's method needs of a vector.
+trait Point:
+    Copy + std::ops::Sub<Output = Self> + std::ops::Add<Output = Self> + std::ops::Mul<f64, Output = Self>
+{
+}
+impl<T: Copy + std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>> Point
+    for T
+{
+}

@@ -1,0 +1,274 @@
+//! Problems that are as they should be.
+
+use std::ops::ControlFlow;
+use std::thread;
+use std::time::Duration;
+
+use warpgait::ipopt::{IterationRecord, Mode, NlpProblem, Options, Solution, Status, solve};
+
+use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, go_on, run};
+
+#[track_caller]
+fn assert_is_hs071(solution: &Solution) {
+    assert_eq!(solution.status, Status::Solved);
+    assert!(solution.status.converged());
+    for (actual, expected) in solution.x.iter().zip(HS071_X) {
+        assert!((actual - expected).abs() < 1e-6, "{:?}", solution.x);
+    }
+    assert!((solution.objective - HS071_OBJECTIVE).abs() < 1e-6);
+}
+
+/// Everything but the times.
+fn without_times(history: &[IterationRecord]) -> Vec<IterationRecord> {
+    history
+        .iter()
+        .map(|record| IterationRecord {
+            seconds: 0.0,
+            ..record.clone()
+        })
+        .collect()
+}
+
+#[test]
+fn hs071_with_the_exact_hessian() {
+    let solution = run(&mut Hs071::new(true), &Options::new()).unwrap();
+    assert_is_hs071(&solution);
+    assert!((solution.constraints[0] - 25.0).abs() < 1e-6);
+    assert!((solution.constraints[1] - 40.0).abs() < 1e-6);
+    // Stationarity: ∇f + Jᵀλ − z_lower + z_upper = 0.
+    let (mut gradient, mut jacobian) = ([0.0; 4], [0.0; 8]);
+    let mut problem = Hs071::new(true);
+    problem.gradient(&solution.x, true, &mut gradient);
+    problem.jacobian_values(&solution.x, false, &mut jacobian);
+    for i in 0..4 {
+        let pull: f64 = (0..2)
+            .map(|c| jacobian[4 * c + i] * solution.constraint_multipliers[c])
+            .sum();
+        let bounds = solution.upper_multipliers[i] - solution.lower_multipliers[i];
+        assert!((gradient[i] + pull + bounds).abs() < 1e-6);
+    }
+    assert!(
+        solution.lower_multipliers[0] > 1.0,
+        "the lower bound of x₀ is active"
+    );
+}
+
+#[test]
+fn hs071_with_limited_memory() {
+    let mut problem = Hs071::new(false);
+    problem.on_call = Box::new(|function| assert_ne!(function, "hessian"));
+    assert_is_hs071(&run(&mut problem, &Options::new()).unwrap());
+}
+
+#[test]
+fn no_constraints_and_a_fixed_variable() {
+    let mut seen = Vec::new();
+    let solution = solve(&mut Unconstrained, &Options::new(), None, &mut |_, x| {
+        seen = x.to_vec();
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert!(solution.status.converged(), "{}", solution.status);
+    assert_eq!(solution.x[0], 3.0);
+    assert!((solution.x[1] - 1.0).abs() < 0.01 && (solution.x[2] - 2.5).abs() < 1e-6);
+    // Apart from the 1e-8 by which Ipopt relaxes bounds on its way.
+    assert!(seen.iter().zip(&solution.x).all(|(a, b)| (a - b).abs() < 1e-7));
+}
+
+#[test]
+fn an_infeasible_problem_is_called_so() {
+    let solution = run(&mut Circle { right_side: -1.0 }, &Options::new()).unwrap();
+    assert_eq!(solution.status, Status::Infeasible);
+    assert!(!solution.status.converged());
+    assert!(
+        solution
+            .history
+            .iter()
+            .any(|record| record.mode == Mode::Restoration)
+    );
+    assert!((solution.history.last().unwrap().violation - 1.0).abs() < 1e-3);
+}
+
+/// The point that `on_iteration` gets is Ipopt's current iterate: f there is the objective that Ipopt reports; and the
+/// violation is that of g there.
+#[test]
+fn the_point_shown_is_the_current_iterate() {
+    let mut restorations = 0;
+    let mut modes = |record: &IterationRecord, x: &[f64]| {
+        let mut problem = Circle { right_side: -1.0 };
+        assert!((problem.objective(x, true) - record.objective).abs() < 1e-9);
+        let violation = x[0] * x[0] + x[1] * x[1] + 1.0;
+        assert!((violation - record.violation).abs() < 1e-12);
+        restorations += usize::from(record.mode == Mode::Restoration);
+        ControlFlow::Continue(())
+    };
+    solve(
+        &mut Circle { right_side: -1.0 },
+        &Options::new(),
+        None,
+        &mut modes,
+    )
+    .unwrap();
+    assert!(restorations > 0);
+    let mut count = 0;
+    let solution = solve(
+        &mut Hs071::new(true),
+        &Options::new(),
+        None,
+        &mut |record, x| {
+            assert_eq!(record.iteration, count);
+            count += 1;
+            assert!((Hs071::new(true).objective(x, true) - record.objective).abs() < 1e-9);
+            ControlFlow::Continue(())
+        },
+    )
+    .unwrap();
+    assert_eq!(solution.history.len(), count);
+    assert!(
+        solution
+            .history
+            .windows(2)
+            .all(|pair| pair[0].seconds <= pair[1].seconds)
+    );
+}
+
+/// Even if Ipopt scales the constraints: 1000 times larger, their violation is 1000 times larger.
+#[test]
+fn the_violation_is_unscaled() {
+    let solution = run(&mut Circle { right_side: 1e8 }, &Options::new()).unwrap();
+    assert_eq!(solution.history[0].violation, 1e8 - 5.0);
+    assert_eq!(solution.status, Status::Solved);
+}
+
+#[test]
+fn the_callback_can_stop_at_its_point() {
+    for stop_at in [0, 3] {
+        let mut seen = Vec::new();
+        let solution = solve(
+            &mut Hs071::new(true),
+            &Options::new(),
+            None,
+            &mut |record, x| {
+                seen = x.to_vec();
+                if record.iteration == stop_at {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        )
+        .unwrap();
+        assert_eq!(solution.status, Status::StoppedByCallback);
+        assert_eq!(solution.history.len(), stop_at + 1);
+        assert_eq!(solution.x, seen);
+        let mut constraints = [0.0; 2];
+        Hs071::new(true).constraints(&seen, true, &mut constraints);
+        assert_eq!(solution.constraints, constraints);
+        assert!((solution.objective - solution.history[stop_at].objective).abs() < 1e-12);
+    }
+}
+
+/// There Ipopt itself returns the point at which the restoration began.
+#[test]
+fn the_callback_can_stop_in_the_restoration_phase() {
+    let mut seen = Vec::new();
+    let mut restorations = 0;
+    let mut problem = Circle { right_side: -1.0 };
+    let solution = solve(&mut problem, &Options::new(), None, &mut |record, x| {
+        seen = x.to_vec();
+        restorations += usize::from(record.mode == Mode::Restoration);
+        if restorations == 3 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .unwrap();
+    assert_eq!(restorations, 3);
+    assert_eq!(solution.status, Status::StoppedByCallback);
+    assert_eq!(solution.x, seen);
+    assert_eq!(solution.objective, seen[0] + seen[1]);
+    assert_eq!(
+        solution.constraints[0],
+        seen[0] * seen[0] + seen[1] * seen[1]
+    );
+}
+
+#[test]
+fn the_same_solve_twice_takes_the_same_iterations() {
+    let options = Options::new().set_str("mu_strategy", "adaptive");
+    let first = run(&mut Hs071::new(false), &options).unwrap();
+    let second = run(&mut Hs071::new(false), &options).unwrap();
+    assert_eq!(first.x, second.x);
+    assert_eq!(
+        without_times(&first.history),
+        without_times(&second.history)
+    );
+}
+
+#[test]
+fn a_warm_start_needs_fewer_iterations() {
+    let cold = run(&mut Hs071::new(true), &Options::new()).unwrap();
+    let mut problem = Hs071::new(true);
+    problem.start.copy_from_slice(&cold.x);
+    let near = Options::new()
+        .set_num("warm_start_bound_push", 1e-9)
+        .set_num("warm_start_mult_bound_push", 1e-9)
+        .set_num("warm_start_slack_bound_push", 1e-9)
+        .set_num("mu_init", 1e-9);
+    let without = run(&mut problem, &near).unwrap();
+    let warm = solve(&mut problem, &near, Some(&cold.multipliers()), &mut go_on).unwrap();
+    assert_is_hs071(&warm);
+    let lengths = [&warm, &without, &cold].map(|solution| solution.history.len());
+    assert!(
+        lengths[0] < lengths[1] && lengths[0] < lengths[2],
+        "{lengths:?}"
+    );
+    // The multipliers were really read: the first iterate is as good as the last one was.
+    assert!(
+        warm.history[0].dual_infeasibility < 1e-6,
+        "{:?}",
+        warm.history[0]
+    );
+}
+
+#[test]
+fn two_threads_take_turns() {
+    let solve_slowly = || {
+        let mut problem = Hs071::new(true);
+        problem.on_call = Box::new(|_| thread::sleep(Duration::from_micros(300)));
+        run(&mut problem, &Options::new()).unwrap()
+    };
+    let threads: Vec<_> = (0..4).map(|_| thread::spawn(solve_slowly)).collect();
+    for thread in threads {
+        assert_is_hs071(&thread.join().unwrap());
+    }
+}
+
+#[test]
+fn time_in_the_problem_is_measured() {
+    let mut problem = Hs071::new(true);
+    problem.on_call = Box::new(|_| thread::sleep(Duration::from_millis(1)));
+    let solution = run(&mut problem, &Options::new()).unwrap();
+    assert!(solution.evaluation_seconds > 1e-3 * 4.0 * (solution.history.len() - 1) as f64);
+    assert!(solution.evaluation_seconds < solution.total_seconds);
+}
+
+#[test]
+fn limits_are_reported() {
+    let solution = run(
+        &mut Hs071::new(true),
+        &Options::new().set_int("max_iter", 2),
+    )
+    .unwrap();
+    assert_eq!(solution.status, Status::MaxIterations);
+    assert_eq!(solution.status.to_string(), "iteration limit reached");
+    assert_eq!(solution.history.len(), 3);
+    let mut problem = Hs071::new(true);
+    problem.on_call = Box::new(|_| {
+        let start = std::time::Instant::now();
+        while start.elapsed() < Duration::from_millis(5) {}
+    });
+    let solution = run(&mut problem, &Options::new().set_num("max_cpu_time", 0.02)).unwrap();
+    assert_eq!(solution.status, Status::MaxCpuTime);
+}
