@@ -1,0 +1,127 @@
+//! Aligned tables for the terminal.
+
+use crate::check::CheckReport;
+use crate::plan::CheckRow;
+
+/// A table with a header; columns of numbers are set flush right.
+pub struct Table {
+    header: Vec<String>,
+    right: Vec<bool>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table without rows; a column name that starts with `>` is set flush right.
+    pub fn new(columns: &[&str]) -> Self {
+        Self {
+            header: columns.iter().map(|c| c.trim_start_matches('>').to_owned()).collect(),
+            right: columns.iter().map(|c| c.starts_with('>')).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row; missing cells stay empty.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        let mut cells: Vec<String> = cells.into_iter().take(self.header.len()).collect();
+        cells.resize(self.header.len(), String::new());
+        self.rows.push(cells);
+    }
+
+    /// The lines; `paint` may colour a cell that is already padded, given its row and column.
+    pub fn lines(&self, paint: impl Fn(usize, usize, String) -> String) -> Vec<String> {
+        let width = |c: usize| {
+            let cells = self.rows.iter().map(|row| row[c].chars().count());
+            cells.chain([self.header[c].chars().count()]).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.header.len()).map(width).collect();
+        let pad = |text: &str, c: usize| {
+            let blanks = " ".repeat(widths[c] - text.chars().count());
+            if self.right[c] { format!("{blanks}{text}") } else { format!("{text}{blanks}") }
+        };
+        let line = |cells: Vec<String>| cells.join("  ").trim_end().to_owned();
+        let header = line(self.header.iter().enumerate().map(|(c, text)| pad(text, c)).collect());
+        let body = self
+            .rows
+            .iter()
+            .enumerate()
+            .map(|(r, row)| line(row.iter().enumerate().map(|(c, text)| paint(r, c, pad(text, c))).collect()));
+        std::iter::once(header).chain(body).collect()
+    }
+}
+
+/// Laws, values, limits and verdicts, with the figures below.
+pub fn check_table(report: &CheckReport, colour: bool) -> String {
+    let mut table = Table::new(&["check", ">value", ">limit", "unit", "verdict", "worst at"]);
+    for row in &report.rows {
+        let verdict = if row.passed { "ok" } else { "FAILS" };
+        table.row([
+            row.name.clone(),
+            number(row.value),
+            number(row.limit),
+            row.unit.clone(),
+            verdict.into(),
+            place(row),
+        ]);
+    }
+    for row in &report.figures {
+        table.row([row.name.clone(), number(row.value), "–".into(), row.unit.clone(), String::new(), place(row)]);
+    }
+    let paint = |r: usize, c: usize, text: String| match (colour && c == 4, report.rows.get(r).map(|row| row.passed)) {
+        (true, Some(true)) => format!("\x1b[32m{text}\x1b[0m"),
+        (true, Some(false)) => format!("\x1b[1;31m{text}\x1b[0m"),
+        _ => text,
+    };
+    table.lines(paint).join("\n")
+}
+
+fn place(row: &CheckRow) -> String {
+    // Where nothing is violated there is no worst place worth a word.
+    if row.value == 0.0 {
+        return String::new();
+    }
+    let time = row.time.map(|t| format!("{t:.3} s"));
+    [time, row.foot.clone()].into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// A number to three figures, in scientific notation where that is shorter.
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        "0".into()
+    } else if !value.is_finite() {
+        value.to_string()
+    } else if !(1e-3..1e5).contains(&size) {
+        format!("{value:.1e}")
+    } else {
+        let decimals = (2 - size.log10().floor() as i32).clamp(0, 4) as usize;
+        format!("{value:.decimals$}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_figures() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.012345, "0.0123"),
+            (3.0, "3.00"),
+            (-41.26, "-41.3"),
+            (12345.6, "12346"),
+            (1e-7, "1.0e-7"),
+            (3e8, "3.0e8"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn columns_are_aligned_by_characters() {
+        let mut table = Table::new(&["a", ">b", "c"]);
+        table.row(["µµµ".to_owned(), "1".to_owned(), "x".to_owned()]);
+        table.row(["y".to_owned(), "100".to_owned()]);
+        assert_eq!(table.lines(|_, _, text| text), ["a      b  c", "µµµ    1  x", "y    100"]);
+    }
+}
