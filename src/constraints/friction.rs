@@ -1,11 +1,13 @@
 //! Eq. 5, the friction cone about the true normal of the ground, for feet that do not adhere.
 //!
 //! ```text
-//!   ν n·f − √(‖f − (n·f) n‖² + ε²) + ε ≥ 0
+//!   ‖f − (n·f) n‖ ≤ ν n·f,  as  ν u − ‖f − u n‖²/√(ν² u² + ε²) ≥ 0,  u = n·f
 //! ```
 //!
-//! with ε = [`CONE_ROUNDING`] m g, which keeps the row smooth at f = 0. The normal is constant during a stance, f is linear
-//! between its samples and the cone is convex: what holds at the samples holds in between.
+//! For u > 0 this is the same convex set up to ε = [`CONE_ROUNDING`] m g (too large by ε²/(4 ν u), below 10⁻⁴ m g where
+//! [`super::normal_force`] holds). The quotient curves along ‖f_t‖ as well as around the axis; the root of Eq. 5 does not,
+//! so that Newton's steps would jump from one side of a slim cone to the other for ever. The normal is constant during a
+//! stance, f is linear between its samples and the cone is convex: what holds at the samples holds in between.
 //!
 //! Rows: one for each free force, in m g.
 
@@ -92,13 +94,38 @@ pub(crate) fn say_blocks(
     });
 }
 
-/// Normal n, share u = n·f along it, ∂u/∂p, and s = √(‖f‖² − u² + ε²).
-fn parts(state: &State, (i, j, k): ForcePlace) -> (Normal, Vector3<f64>, f64, Vector3<f64>, f64) {
+/// g(u, w) = ν u − (w − u²)/r(u), r = √(ν² u² + ε²), with its derivatives; u = n·f, w = ‖f‖².
+pub(crate) struct Cone {
+    pub g: f64,
+    pub u: f64,
+    pub w: f64,
+    pub uu: f64,
+    pub uw: f64,
+}
+
+impl Cone {
+    pub fn new(friction: f64, u: f64, w: f64) -> Self {
+        let square = friction * friction;
+        let r = (square * u * u + CONE_ROUNDING * CONE_ROUNDING).sqrt();
+        let r1 = square * u / r;
+        let r2 = square * CONE_ROUNDING * CONE_ROUNDING / (r * r * r);
+        let q = w - u * u;
+        Self {
+            g: friction * u - q / r,
+            u: friction + q * r1 / (r * r) + 2.0 * u / r,
+            w: -1.0 / r,
+            uu: q * (r2 / (r * r) - 2.0 * r1 * r1 / (r * r * r)) + 2.0 / r - 4.0 * u * r1 / (r * r),
+            uw: r1 / (r * r),
+        }
+    }
+}
+
+/// The normal, f, ∂u/∂p, and the cone there.
+fn parts(friction: f64, state: &State, (i, j, k): ForcePlace) -> (Normal, Vector3<f64>, Vector3<f64>, Cone) {
     let normal = Normal::new(&state.contacts[i][j].ground);
     let f = state.forces[i][k];
     let (u, du) = normal.along(&f);
-    let s = ((f - normal.n * u).norm_squared() + CONE_ROUNDING * CONE_ROUNDING).sqrt();
-    (normal, f, u, du, s)
+    (normal, f, du, Cone::new(friction, u, f.norm_squared()))
 }
 
 impl Constraint for Friction {
@@ -117,20 +144,18 @@ impl Constraint for Friction {
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &place) in out.iter_mut().zip(&self.places) {
-            let (_, _, u, _, s) = parts(state, place);
-            *value = self.friction * u - s + CONE_ROUNDING;
+            *value = parts(self.friction, state, place).3.g;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &place) in self.places.iter().enumerate() {
-            let (normal, f, u, du, s) = parts(state, place);
-            let a = self.friction + u / s;
-            let by_force = normal.n * a - f / s;
+            let (normal, f, du, cone) = parts(self.friction, state, place);
+            let by_force = normal.n * cone.u + f * (2.0 * cone.w);
             with_tangents(model, state, place, |force, by_foothold, position| {
                 force.row(first + r, &by_force, sink);
                 by_foothold.row(first + r, &by_force, sink);
-                position.row(first + r, &(du * a), sink);
+                position.row(first + r, &(du * cone.u), sink);
             });
         }
     }
@@ -144,22 +169,18 @@ impl Constraint for Friction {
         sink: &mut Sink,
     ) {
         for (&lambda, &place) in multipliers.iter().zip(&self.places) {
-            let (normal, f, u, du, s) = parts(state, place);
-            let (i, j, k) = place;
-            let (a, n) = (self.friction + u / s, normal.n);
-            curvature.forces[i][k] += (n * a - f / s) * lambda;
-            curvature.contacts[i][j] += du * (a * lambda);
-            // s(f, u): s_ff = 1/s − f fᵀ/s³, s_fu = f u/s³, s_uu = −1/s − u²/s³.
-            let s3 = s * s * s;
-            let s_uu = -1.0 / s - u * u / s3;
-            let s_fu = f * (u / s3);
-            let ff = Matrix3::identity() / s - f * f.transpose() / s3
-                + s_fu * n.transpose()
-                + n * s_fu.transpose()
-                + n * n.transpose() * s_uu;
-            let fp = normal.jacobian() * a - (s_fu + n * s_uu) * du.transpose();
-            let pp = normal.curvature(&f) * a - du * du.transpose() * s_uu;
-            say_blocks(model, state, place, Some(&(ff * -lambda)), &(fp * lambda), &(pp * lambda), sink);
+            let (normal, f, du, cone) = parts(self.friction, state, place);
+            let ((i, j, k), n) = (place, normal.n);
+            curvature.forces[i][k] += (n * cone.u + f * (2.0 * cone.w)) * lambda;
+            curvature.contacts[i][j] += du * (cone.u * lambda);
+            // By the chain rule through u(f, p) and w(f).
+            let mixed = n * cone.uu + f * (2.0 * cone.uw);
+            let ff = Matrix3::identity() * (2.0 * cone.w)
+                + n * mixed.transpose()
+                + f * n.transpose() * (2.0 * cone.uw);
+            let fp = normal.jacobian() * cone.u + mixed * du.transpose();
+            let pp = normal.curvature(&f) * cone.u + du * du.transpose() * cone.uu;
+            say_blocks(model, state, place, Some(&(ff * lambda)), &(fp * lambda), &(pp * lambda), sink);
         }
     }
 

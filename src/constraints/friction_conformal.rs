@@ -1,16 +1,15 @@
 //! Eq. 9, the friction cone in F as if φ were conformal: a constant cone about z̄ on the pulled-back force.
 //!
 //! ```text
-//!   ν f̄_z − √(f̄_x² + f̄_y² + ε²) + ε ≥ 0
+//!   √(f̄_x² + f̄_y²) ≤ ν f̄_z,  in the form of [`super::friction`] with n = z̄
 //! ```
 //!
 //! Rows: one for each free force of a foot that does not adhere, in m g.
 
 use nalgebra::Vector3;
 
-use super::friction::{ForcePlace, force_node, force_places};
+use super::friction::{Cone, ForcePlace, force_node, force_places};
 use super::{Constraint, Place};
-use crate::nlp::model::CONE_ROUNDING;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
@@ -27,10 +26,6 @@ impl FrictionConformal {
     pub fn new(model: &Model, friction: f64) -> Self {
         Self { friction, places: force_places(model, |i| !model.adhesive[i]) }
     }
-}
-
-fn tangential(f: &Vector3<f64>) -> f64 {
-    (f.x * f.x + f.y * f.y + CONE_ROUNDING * CONE_ROUNDING).sqrt()
 }
 
 impl Constraint for FrictionConformal {
@@ -50,17 +45,17 @@ impl Constraint for FrictionConformal {
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &(i, _, k)) in out.iter_mut().zip(&self.places) {
             let f = &state.warped_forces[i][k];
-            *value = self.friction * f.z - tangential(f) + CONE_ROUNDING;
+            *value = Cone::new(self.friction, f.z, f.norm_squared()).g;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &(i, j, k)) in self.places.iter().enumerate() {
             let f = &state.warped_forces[i][k];
-            let s = tangential(f);
-            let node = force_node(model, (i, j, k));
-            for (d, value) in [-f.x / s, -f.y / s, self.friction].into_iter().enumerate() {
-                sink.node(first + r, node, d, value);
+            let cone = Cone::new(self.friction, f.z, f.norm_squared());
+            let gradient = f * (2.0 * cone.w) + Vector3::z() * cone.u;
+            for d in 0..3 {
+                sink.node(first + r, force_node(model, (i, j, k)), d, gradient[d]);
             }
         }
     }
@@ -75,12 +70,13 @@ impl Constraint for FrictionConformal {
     ) {
         for (&lambda, &(i, j, k)) in multipliers.iter().zip(&self.places) {
             let f = &state.warped_forces[i][k];
-            let s = tangential(f);
-            let s3 = s * s * s;
+            let cone = Cone::new(self.friction, f.z, f.norm_squared());
             let node = force_node(model, (i, j, k));
-            sink.own(node, 0, 0, lambda * (f.x * f.x / s3 - 1.0 / s));
-            sink.own(node, 1, 0, lambda * f.x * f.y / s3);
-            sink.own(node, 1, 1, lambda * (f.y * f.y / s3 - 1.0 / s));
+            sink.own(node, 0, 0, lambda * 2.0 * cone.w);
+            sink.own(node, 1, 1, lambda * 2.0 * cone.w);
+            sink.own(node, 2, 0, lambda * 2.0 * cone.uw * f.x);
+            sink.own(node, 2, 1, lambda * 2.0 * cone.uw * f.y);
+            sink.own(node, 2, 2, lambda * (2.0 * cone.w + cone.uu + 4.0 * cone.uw * f.z));
         }
     }
 

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //!   −pull_limit ≤ n·f ≤ force_limit      (adhesive feet)
-//!           n·f ≤ force_limit            (others: the friction cone keeps them from pulling)
+//!     least ≤ n·f ≤ force_limit          (others: a standing foot presses on the ground, [`LEAST_NORMAL_FORCE`])
 //! ```
 //!
 //! Rows: one for each free force, in m g.
 
 use super::friction::{ForcePlace, force_places, say_blocks, with_tangents};
 use super::{Constraint, Normal, Place};
+use crate::nlp::model::LEAST_NORMAL_FORCE;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
@@ -39,7 +40,7 @@ impl Constraint for NormalForce {
 
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         for (r, &(i, ..)) in self.places.iter().enumerate() {
-            lower[r] = if model.adhesive[i] { -self.pull_limit } else { f64::NEG_INFINITY };
+            lower[r] = if model.adhesive[i] { -self.pull_limit } else { LEAST_NORMAL_FORCE };
             upper[r] = self.force_limit;
         }
     }

@@ -21,9 +21,7 @@ const FILL_SWEEPS: usize = 5000;
 pub fn fill_holes(columns: usize, heights: &mut [f64]) -> Result<usize> {
     let holes = heights.iter().filter(|h| h.is_nan()).count();
     if holes == heights.len() {
-        return Err(Error::input(
-            "there is no height in it: every cell is without data",
-        ));
+        return Err(Error::input("there is no height in it: every cell is without data"));
     }
     if holes > 0 {
         let (low, high) = range(heights);
@@ -37,17 +35,13 @@ pub fn range(heights: &[f64]) -> (f64, f64) {
     heights
         .iter()
         .filter(|h| !h.is_nan())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
-            (low.min(*h), high.max(*h))
-        })
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(*h), high.max(*h)))
 }
 
 /// Solves on a raster of half the resolution first: its solution, interpolated, is where the sweeps start here.
 fn fill_level(columns: usize, heights: &mut [f64], tolerance: f64) {
     let rows = heights.len() / columns;
-    let holes: Vec<usize> = (0..heights.len())
-        .filter(|&i| heights[i].is_nan())
-        .collect();
+    let holes: Vec<usize> = (0..heights.len()).filter(|&i| heights[i].is_nan()).collect();
     if holes.is_empty() {
         return;
     }
@@ -90,11 +84,7 @@ fn over_relaxation(columns: usize, rows: usize, heights: &[f64]) -> f64 {
         for line in 0..lines {
             let mut run = 0;
             for k in 0..length {
-                run = if heights[at(line, k)].is_nan() {
-                    run + 1
-                } else {
-                    0
-                };
+                run = if heights[at(line, k)].is_nan() { run + 1 } else { 0 };
                 longest = longest.max(run);
             }
         }
@@ -132,26 +122,17 @@ fn half_at(half_columns: usize, half: &[f64], column: usize, row: usize) -> f64 
     let half_rows = half.len() / half_columns;
     // The centre of coarse cell k is at 2k + ½ in fine cells.
     let place = |k: usize, count: usize| ((k as f64 - 0.5) / 2.0).clamp(0.0, (count - 1) as f64);
-    bilinear(
-        half_columns,
-        half,
-        place(column, half_columns),
-        place(row, half_rows),
-    )
+    bilinear(half_columns, half, place(column, half_columns), place(row, half_rows))
 }
 
 /// The raster, bilinear, at a place given in columns and rows; clamped to the raster.
 pub fn bilinear(columns: usize, heights: &[f64], column: f64, row: f64) -> f64 {
     let rows = heights.len() / columns;
-    let (column, row) = (
-        column.clamp(0.0, (columns - 1) as f64),
-        row.clamp(0.0, (rows - 1) as f64),
-    );
+    let (column, row) = (column.clamp(0.0, (columns - 1) as f64), row.clamp(0.0, (rows - 1) as f64));
     let (c, r) = (column as usize, row as usize);
     let (c_next, r_next) = ((c + 1).min(columns - 1), (r + 1).min(rows - 1));
     let (s, t) = (column - c as f64, row - r as f64);
-    let along_x =
-        |r: usize| heights[r * columns + c] * (1.0 - s) + heights[r * columns + c_next] * s;
+    let along_x = |r: usize| heights[r * columns + c] * (1.0 - s) + heights[r * columns + c_next] * s;
     along_x(r) * (1.0 - t) + along_x(r_next) * t
 }
 
@@ -168,9 +149,8 @@ pub fn smooth(columns: usize, heights: &[f64], filled: &[bool], width: f64) -> V
         return heights.to_vec();
     }
     let reach = (KERNEL_REACH * width).ceil() as usize;
-    let kernel: Vec<f64> = (0..=2 * reach)
-        .map(|k| (-0.5 * ((k as f64 - reach as f64) / width).powi(2)).exp())
-        .collect();
+    let kernel: Vec<f64> =
+        (0..=2 * reach).map(|k| (-0.5 * ((k as f64 - reach as f64) / width).powi(2)).exp()).collect();
     let mut result = Vec::with_capacity(heights.len());
     for band in (0..rows).step_by(BAND) {
         let first = band.saturating_sub(reach);
@@ -198,25 +178,14 @@ pub fn smooth(columns: usize, heights: &[f64], filled: &[bool], width: f64) -> V
 }
 
 /// Σ w, Σ w dx, Σ w dx², Σ w z, Σ w z dx along the row through cell i, with dx in cells from it.
-fn row_moments(
-    columns: usize,
-    heights: &[f64],
-    filled: &[bool],
-    kernel: &[f64],
-    i: usize,
-) -> [f64; 5] {
+fn row_moments(columns: usize, heights: &[f64], filled: &[bool], kernel: &[f64], i: usize) -> [f64; 5] {
     let reach = kernel.len() / 2;
     let column = i % columns;
     let start = i - column;
     let mut sums = [0.0; 5];
     for c in column.saturating_sub(reach)..(column + reach + 1).min(columns) {
         let dx = c as f64 - column as f64;
-        let w = kernel[c + reach - column]
-            * if filled[start + c] {
-                FILLED_WEIGHT
-            } else {
-                1.0
-            };
+        let w = kernel[c + reach - column] * if filled[start + c] { FILLED_WEIGHT } else { 1.0 };
         let z = heights[start + c];
         for (sum, term) in sums.iter_mut().zip([1.0, dx, dx * dx, z, z * dx]) {
             *sum += w * term;
@@ -239,9 +208,7 @@ mod tests {
     use super::*;
 
     fn raster(columns: usize, rows: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-        (0..columns * rows)
-            .map(|i| f((i % columns) as f64, (i / columns) as f64))
-            .collect()
+        (0..columns * rows).map(|i| f((i % columns) as f64, (i / columns) as f64)).collect()
     }
 
     #[test]
@@ -260,12 +227,7 @@ mod tests {
         }
         holed[3] = f64::NAN; // at the border the membrane is free: no plane there, but finite
         assert_eq!(fill_holes(60, &mut holed).unwrap(), count + 1);
-        for (i, (a, b)) in holed
-            .iter()
-            .zip(&plane)
-            .enumerate()
-            .filter(|(i, _)| *i != 3)
-        {
+        for (i, (a, b)) in holed.iter().zip(&plane).enumerate().filter(|(i, _)| *i != 3) {
             assert!((a - b).abs() < 1e-5, "{i}: {a} against {b}");
         }
         assert!((holed[3] - plane[3]).abs() < 0.03);
@@ -274,9 +236,8 @@ mod tests {
     #[test]
     fn filled_holes_are_harmonic_and_stay_between_their_borders() {
         let mut heights = raster(40, 40, |x, y| (0.3 * x).sin() + (0.2 * y).cos());
-        let holes: Vec<usize> = (0..1600)
-            .filter(|i| (i % 40 > 8 && i % 40 < 30) && (i / 40 > 12 && i / 40 < 33))
-            .collect();
+        let holes: Vec<usize> =
+            (0..1600).filter(|i| (i % 40 > 8 && i % 40 < 30) && (i / 40 > 12 && i / 40 < 33)).collect();
         holes.iter().for_each(|&i| heights[i] = f64::NAN);
         let (low, high) = range(&heights);
         fill_holes(40, &mut heights).unwrap();
@@ -299,9 +260,7 @@ mod tests {
     #[test]
     fn smoothing_leaves_planes_alone_up_to_the_border_and_beside_holes() {
         let plane = raster(150, 70, |x, y| 0.03 * x + 0.01 * y);
-        let filled: Vec<bool> = (0..plane.len())
-            .map(|i| i % 7 == 0 || i % 150 > 100)
-            .collect();
+        let filled: Vec<bool> = (0..plane.len()).map(|i| i % 7 == 0 || i % 150 > 100).collect();
         for width in [0.3, 1.5, 6.0] {
             for (a, b) in smooth(150, &plane, &filled, width).iter().zip(&plane) {
                 assert!((a - b).abs() < 1e-10);

@@ -40,11 +40,7 @@ impl<'lock> Application<'lock> {
     ///
     /// # Errors
     /// [`IpoptError::Refused`], which the checks of [`Layout`] should make impossible.
-    pub fn new(
-        layout: &Layout,
-        callbacks: Callbacks,
-        lock: &'lock SolverLock,
-    ) -> Result<Self, IpoptError> {
+    pub fn new(layout: &Layout, callbacks: Callbacks, lock: &'lock SolverLock) -> Result<Self, IpoptError> {
         const INDICES_FROM_ZERO: ffi::Index = 0;
         // SAFETY: the bounds are n and m numbers long; Ipopt copies them and does not write to them. Their counts, and
         // those of the entries, fit into 32 bits (checked by `Layout`).
@@ -73,9 +69,8 @@ impl<'lock> Application<'lock> {
             _lock: lock,
         };
         // SAFETY: the problem is valid, and the callback has the type that Ipopt expects.
-        let accepted = unsafe {
-            ffi::SetIntermediateCallback(application.problem.as_ptr(), callbacks.iteration)
-        };
+        let accepted =
+            unsafe { ffi::SetIntermediateCallback(application.problem.as_ptr(), callbacks.iteration) };
         if ffi::is_true(accepted) && application.silence() {
             Ok(application)
         } else {
@@ -103,16 +98,7 @@ impl<'lock> Application<'lock> {
         // or calls back; in every version from 3.11 to 3.14.
         let status = unsafe {
             let problem = self.problem.as_ptr();
-            ffi::IpoptSolve(
-                problem,
-                nothing,
-                nothing,
-                nothing,
-                nothing,
-                nothing,
-                nothing,
-                null_mut(),
-            )
+            ffi::IpoptSolve(problem, nothing, nothing, nothing, nothing, nothing, nothing, null_mut())
         };
         status == ffi::Invalid_Problem_Definition
     }
@@ -161,11 +147,7 @@ impl<'lock> Application<'lock> {
             (&multipliers.lower, self.num_variables),
             (&multipliers.upper, self.num_variables),
         ] {
-            assert_eq!(
-                values.len(),
-                count,
-                "Ipopt writes as many numbers as the problem has"
-            );
+            assert_eq!(values.len(), count, "Ipopt writes as many numbers as the problem has");
         }
         // SAFETY: the problem is valid, the arrays have the lengths that Ipopt reads and writes (just asserted), the
         // lock keeps every other thread out of Ipopt, and the caller vouches for the user data.

@@ -83,9 +83,7 @@ impl<'a, P: NlpProblem> Session<'a, P> {
     /// Remembers the iteration, tells `on_iteration`, and says whether to go on.
     fn iterate(&mut self, record: IterationRecord) -> bool {
         if self.stop.is_none() {
-            let asked = catch_unwind(AssertUnwindSafe(|| {
-                (self.on_iteration)(&record, &self.last_x)
-            }));
+            let asked = catch_unwind(AssertUnwindSafe(|| (self.on_iteration)(&record, &self.last_x)));
             self.history.push(record);
             self.stop = match asked {
                 Err(payload) => Some(Stop::Panic(payload)),
@@ -179,9 +177,7 @@ unsafe extern "C" fn objective<P: NlpProblem>(
         let n = session.layout.num_variables;
         (session, input(x, n), output(value, 1))
     };
-    session.evaluate(value, |problem, out| {
-        out[0] = problem.objective(x, ffi::is_true(new_x))
-    });
+    session.evaluate(value, |problem, out| out[0] = problem.objective(x, ffi::is_true(new_x)));
     if session.layout.num_constraints == 0 {
         session.last_x.copy_from_slice(x);
     }
@@ -201,9 +197,7 @@ unsafe extern "C" fn gradient<P: NlpProblem>(
         let n = session.layout.num_variables;
         (session, input(x, n), output(out, n))
     };
-    session.evaluate(out, |problem, out| {
-        problem.gradient(x, ffi::is_true(new_x), out)
-    });
+    session.evaluate(out, |problem, out| problem.gradient(x, ffi::is_true(new_x), out));
     ffi::TRUE
 }
 
@@ -221,9 +215,7 @@ unsafe extern "C" fn constraints<P: NlpProblem>(
         let (n, m) = (session.layout.num_variables, session.layout.num_constraints);
         (session, input(x, n), output(out, m))
     };
-    session.evaluate(out, |problem, out| {
-        problem.constraints(x, ffi::is_true(new_x), out)
-    });
+    session.evaluate(out, |problem, out| problem.constraints(x, ffi::is_true(new_x), out));
     session.last_x.copy_from_slice(x);
     session.last_constraints.copy_from_slice(out);
     ffi::TRUE
@@ -250,9 +242,7 @@ unsafe extern "C" fn jacobian<P: NlpProblem>(
         let (n, entries) = (session.layout.num_variables, session.layout.jacobian.len());
         (session, input(x, n), output(values, entries))
     };
-    session.evaluate(out, |problem, out| {
-        problem.jacobian_values(x, ffi::is_true(new_x), out)
-    });
+    session.evaluate(out, |problem, out| problem.jacobian_values(x, ffi::is_true(new_x), out));
     ffi::TRUE
 }
 
@@ -282,12 +272,7 @@ unsafe extern "C" fn hessian<P: NlpProblem>(
         }
         let (n, m) = (session.layout.num_variables, session.layout.num_constraints);
         let entries = structure.len();
-        (
-            session,
-            input(x, n),
-            input(multipliers, m),
-            output(values, entries),
-        )
+        (session, input(x, n), input(multipliers, m), output(values, entries))
     };
     session.evaluate(out, |problem, out| {
         problem.hessian_values(
@@ -320,11 +305,7 @@ unsafe extern "C" fn iteration<P: NlpProblem>(
     let session = unsafe { session::<P>(user_data) };
     let record = IterationRecord {
         iteration: usize::try_from(iteration).unwrap_or(0),
-        mode: if mode == 0 {
-            Mode::Regular
-        } else {
-            Mode::Restoration
-        },
+        mode: if mode == 0 { Mode::Regular } else { Mode::Restoration },
         objective,
         violation: session.layout.violation(&session.last_constraints),
         dual_infeasibility,
@@ -336,9 +317,5 @@ unsafe extern "C" fn iteration<P: NlpProblem>(
         line_search_trials: usize::try_from(line_search_trials).unwrap_or(0),
         seconds: session.started.elapsed().as_secs_f64(),
     };
-    if session.iterate(record) {
-        ffi::TRUE
-    } else {
-        ffi::FALSE
-    }
+    if session.iterate(record) { ffi::TRUE } else { ffi::FALSE }
 }

@@ -42,9 +42,7 @@ pub enum IpoptError {
         allowed: String,
     },
     /// There are constraints, but the Jacobian has no entries.
-    #[error(
-        "the problem has {0} constraints, but none depends on a variable: the Jacobian is empty"
-    )]
+    #[error("the problem has {0} constraints, but none depends on a variable: the Jacobian is empty")]
     EmptyJacobian(usize),
     /// A bound is NaN, or the lower one is above the upper one, or infinite on the wrong side.
     #[error("{what} {index} has the bounds [{lower}, {upper}], between which there is no number")]

@@ -44,17 +44,12 @@ impl Layout {
         }
         countable("variables", n)?;
         countable("constraints", m)?;
-        let (variable_lower, variable_upper) = bounds("variable", n, |lower, upper| {
-            problem.variable_bounds(lower, upper)
-        })?;
-        let (constraint_lower, constraint_upper) = bounds("constraint", m, |lower, upper| {
-            problem.constraint_bounds(lower, upper)
-        })?;
+        let (variable_lower, variable_upper) =
+            bounds("variable", n, |lower, upper| problem.variable_bounds(lower, upper))?;
+        let (constraint_lower, constraint_upper) =
+            bounds("constraint", m, |lower, upper| problem.constraint_bounds(lower, upper))?;
         let jacobian = jacobian(problem.jacobian_structure(), n, m)?;
-        let hessian = problem
-            .hessian_structure()
-            .map(|pair| hessian(pair, n))
-            .transpose()?;
+        let hessian = problem.hessian_structure().map(|pair| hessian(pair, n)).transpose()?;
         Ok(Self {
             num_variables: n,
             num_constraints: m,
@@ -82,17 +77,10 @@ impl Layout {
     ///
     /// # Errors
     /// When they have the wrong length or are not finite.
-    pub fn initial_multipliers(
-        &self,
-        given: Option<&Multipliers>,
-    ) -> Result<Multipliers, IpoptError> {
+    pub fn initial_multipliers(&self, given: Option<&Multipliers>) -> Result<Multipliers, IpoptError> {
         let (n, m) = (self.num_variables, self.num_constraints);
         let Some(given) = given else {
-            return Ok(Multipliers {
-                constraint: vec![0.0; m],
-                lower: vec![0.0; n],
-                upper: vec![0.0; n],
-            });
+            return Ok(Multipliers { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] });
         };
         for (what, expected, values) in [
             ("constraint multiplier", m, &given.constraint),
@@ -100,11 +88,7 @@ impl Layout {
             ("upper bound multiplier", n, &given.upper),
         ] {
             if values.len() != expected {
-                return Err(IpoptError::MultiplierCount {
-                    what,
-                    expected,
-                    actual: values.len(),
-                });
+                return Err(IpoptError::MultiplierCount { what, expected, actual: values.len() });
             }
             finite(what, values)?;
         }
@@ -114,33 +98,20 @@ impl Layout {
     /// By how much g (m,) lies outside its bounds, max norm; NaN if an entry is.
     pub fn violation(&self, constraints: &[f64]) -> f64 {
         let bounds = self.constraint_lower.iter().zip(&self.constraint_upper);
-        constraints
-            .iter()
-            .zip(bounds)
-            .fold(0.0, |worst, (value, (lower, upper))| {
-                let outside = (lower - value).max(value - upper);
-                if outside > worst || value.is_nan() {
-                    outside
-                } else {
-                    worst
-                }
-            })
+        constraints.iter().zip(bounds).fold(0.0, |worst, (value, (lower, upper))| {
+            let outside = (lower - value).max(value - upper);
+            if outside > worst || value.is_nan() { outside } else { worst }
+        })
     }
 }
 
 fn countable(what: &'static str, count: usize) -> Result<(), IpoptError> {
-    i32::try_from(count)
-        .map(|_| ())
-        .map_err(|_| IpoptError::TooLarge { what, count })
+    i32::try_from(count).map(|_| ()).map_err(|_| IpoptError::TooLarge { what, count })
 }
 
 fn finite(what: &'static str, values: &[f64]) -> Result<(), IpoptError> {
     match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(IpoptError::NotFinite {
-            what,
-            index,
-            value: values[index],
-        }),
+        Some(index) => Err(IpoptError::NotFinite { what, index, value: values[index] }),
         None => Ok(()),
     }
 }
@@ -155,12 +126,7 @@ fn bounds(
     for (index, (lower, upper)) in all_lower.iter_mut().zip(&mut all_upper).enumerate() {
         let possible = *lower <= *upper && *lower < f64::INFINITY && *upper > f64::NEG_INFINITY;
         if !possible {
-            return Err(IpoptError::Bounds {
-                what,
-                index,
-                lower: *lower,
-                upper: *upper,
-            });
+            return Err(IpoptError::Bounds { what, index, lower: *lower, upper: *upper });
         }
         *lower = lower.max(-NO_BOUND);
         *upper = upper.min(NO_BOUND);
@@ -168,11 +134,7 @@ fn bounds(
     Ok((all_lower, all_upper))
 }
 
-fn jacobian(
-    (rows, columns): (&[i32], &[i32]),
-    n: usize,
-    m: usize,
-) -> Result<Structure, IpoptError> {
+fn jacobian((rows, columns): (&[i32], &[i32]), n: usize, m: usize) -> Result<Structure, IpoptError> {
     let name = "Jacobian";
     let structure = structure(
         name,
@@ -209,17 +171,10 @@ fn structure(
     description: impl Fn() -> String,
 ) -> Result<Structure, IpoptError> {
     if rows.len() != columns.len() {
-        return Err(IpoptError::StructureLengths {
-            matrix,
-            rows: rows.len(),
-            columns: columns.len(),
-        });
+        return Err(IpoptError::StructureLengths { matrix, rows: rows.len(), columns: columns.len() });
     }
     countable("matrix entries", rows.len())?;
-    let wrong = rows
-        .iter()
-        .zip(columns)
-        .position(|(&row, &column)| !allowed(row, column));
+    let wrong = rows.iter().zip(columns).position(|(&row, &column)| !allowed(row, column));
     if let Some(entry) = wrong {
         return Err(IpoptError::StructureIndex {
             matrix,
@@ -229,8 +184,5 @@ fn structure(
             allowed: description(),
         });
     }
-    Ok(Structure {
-        rows: rows.to_vec(),
-        columns: columns.to_vec(),
-    })
+    Ok(Structure { rows: rows.to_vec(), columns: columns.to_vec() })
 }

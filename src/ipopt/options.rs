@@ -4,11 +4,7 @@ use super::IpoptError;
 use super::application::Application;
 
 /// What [`super::solve`] relies on: no option file, and its own value for "no bound".
-const RESERVED: [&str; 3] = [
-    "option_file_name",
-    "nlp_lower_bound_inf",
-    "nlp_upper_bound_inf",
-];
+const RESERVED: [&str; 3] = ["option_file_name", "nlp_lower_bound_inf", "nlp_upper_bound_inf"];
 
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,10 +66,7 @@ impl Options {
     /// The value of an option, if it was set.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&OptionValue> {
-        self.settings
-            .iter()
-            .find(|(known, _)| known == name)
-            .map(|(_, value)| value)
+        self.settings.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
     /// Hands every setting to Ipopt, which must have been silenced before.
@@ -86,34 +79,20 @@ impl Options {
         has_hessian: bool,
         warm_start: bool,
     ) -> Result<(), IpoptError> {
-        let wants_exact =
-            self.get("hessian_approximation") == Some(&OptionValue::Str("exact".into()));
+        let wants_exact = self.get("hessian_approximation") == Some(&OptionValue::Str("exact".into()));
         if wants_exact && !has_hessian {
             return Err(IpoptError::NoHessian);
         }
         let defaults = Self::new()
             .set_str("check_derivatives_for_naninf", "yes")
-            .set_str(
-                "hessian_approximation",
-                if has_hessian {
-                    "exact"
-                } else {
-                    "limited-memory"
-                },
-            )
-            .set_str(
-                "warm_start_init_point",
-                if warm_start { "yes" } else { "no" },
-            );
+            .set_str("hessian_approximation", if has_hessian { "exact" } else { "limited-memory" })
+            .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" });
         for (name, value) in defaults.settings.iter().chain(&self.settings) {
             if RESERVED.contains(&name.as_str()) {
                 return Err(IpoptError::OptionReserved(name.clone()));
             }
             if !application.set_option(name, value) {
-                return Err(IpoptError::OptionRejected {
-                    name: name.clone(),
-                    value: value.clone(),
-                });
+                return Err(IpoptError::OptionRejected { name: name.clone(), value: value.clone() });
             }
         }
         Ok(())

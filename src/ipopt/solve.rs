@@ -30,20 +30,12 @@ pub fn solve<P: NlpProblem>(
     let multipliers = layout.initial_multipliers(warm_start)?;
     let lock = SolverLock::acquire()?;
     let mut application = Application::new(&layout, callbacks::<P>(), &lock)?;
-    options.apply(
-        &mut application,
-        layout.hessian.is_some(),
-        warm_start.is_some(),
-    )?;
+    options.apply(&mut application, layout.hessian.is_some(), warm_start.is_some())?;
 
     let start = Instant::now();
     let mut session = Session::new(problem, on_iteration, &layout, &x);
-    let mut iterate = Iterate {
-        constraints: vec![f64::NAN; layout.num_constraints],
-        objective: f64::NAN,
-        x,
-        multipliers,
-    };
+    let mut iterate =
+        Iterate { constraints: vec![f64::NAN; layout.num_constraints], objective: f64::NAN, x, multipliers };
     // SAFETY: the callbacks are those for a `Session<P>`, which is borrowed by nothing else until the call returns.
     let code = unsafe { application.solve(&mut iterate, (&raw mut session).cast()) };
     let total_seconds = start.elapsed().as_secs_f64();
@@ -58,13 +50,7 @@ pub fn solve<P: NlpProblem>(
             resume_unwind(payload);
         }
     };
-    let Session {
-        history,
-        last_x,
-        last_constraints,
-        evaluation_time,
-        ..
-    } = session;
+    let Session { history, last_x, last_constraints, evaluation_time, .. } = session;
     if matches!(status, Status::StoppedByCallback | Status::Interrupted) {
         // Stopped in the restoration phase, Ipopt returns the point at which that phase began. The caller stopped
         // because of the point that it saw.
@@ -74,12 +60,7 @@ pub fn solve<P: NlpProblem>(
         iterate.x = last_x;
         iterate.constraints = last_constraints;
     }
-    let Iterate {
-        x,
-        constraints,
-        objective,
-        multipliers,
-    } = iterate;
+    let Iterate { x, constraints, objective, multipliers } = iterate;
     Ok(Solution {
         x,
         objective,

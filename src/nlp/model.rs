@@ -14,8 +14,11 @@ use crate::{Error, Result};
 /// m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// Rounds the tip of the friction cone, in m g: ‖f_t‖ becomes √(‖f_t‖² + ε²) − ε.
-pub const CONE_ROUNDING: f64 = 1e-3;
+/// ε that rounds the tip of the friction cone, in m g; see [`crate::constraints::friction`].
+pub const CONE_ROUNDING: f64 = 2e-3;
+
+/// Least normal force of a standing foot that does not adhere, in m g, away from the switches.
+pub const LEAST_NORMAL_FORCE: f64 = 0.02;
 
 /// Points of the torso's underside at which its clearance is asked for, along x and y.
 pub const UNDERSIDE: [usize; 2] = [5, 3];

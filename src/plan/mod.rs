@@ -2,6 +2,7 @@
 
 pub mod npz;
 mod read;
+pub mod sampled;
 mod write;
 
 pub use read::PLAN_SCHEMA;

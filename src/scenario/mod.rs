@@ -449,8 +449,8 @@ pub struct SolverSpec {
     pub tolerance: f64,
     /// Whether to grow the terrain out of the plane when the plain solve fails.
     pub continuation: Continuation,
-    /// Which Hessian.
-    pub hessian: Hessian,
+    /// Which Hessian; default: exact where there is a cost, limited memory where there is none.
+    pub hessian: Option<Hessian>,
     /// How far to go.
     pub effort: Effort,
 }
@@ -461,7 +461,7 @@ impl Default for SolverSpec {
             max_iterations: 200,
             tolerance: 1e-4,
             continuation: Continuation::Mode(ContinuationMode::Auto),
-            hessian: Hessian::LimitedMemory,
+            hessian: None,
             effort: Effort::Smooth,
         }
     }

@@ -56,15 +56,14 @@ impl Analytic {
     /// For parameters out of range. (That each parameter belongs to the kind is checked by [`super::build`].)
     pub fn new(spec: &TerrainSpec) -> Result<Self> {
         let level = spec.level.unwrap_or_default();
-        let parameter =
-            |name: &str, given: Option<f64>, [easy, medium, hard]: [f64; 3], range: [f64; 2]| {
-                let value = given.unwrap_or(match level {
-                    Level::Easy => easy,
-                    Level::Medium => medium,
-                    Level::Hard => hard,
-                });
-                super::in_range(name, value, range)
-            };
+        let parameter = |name: &str, given: Option<f64>, [easy, medium, hard]: [f64; 3], range: [f64; 2]| {
+            let value = given.unwrap_or(match level {
+                Level::Easy => easy,
+                Level::Medium => medium,
+                Level::Hard => hard,
+            });
+            super::in_range(name, value, range)
+        };
         Ok(match spec.kind {
             TerrainKind::Flat => Self::Flat,
             TerrainKind::Rippled => Self::Rippled {
@@ -87,10 +86,7 @@ impl Analytic {
                 edge: parameter("edge", spec.edge, [0.20, 0.15, 0.10], LENGTH)?,
             },
             TerrainKind::Formula | TerrainKind::Heightmap | TerrainKind::Mesh => {
-                return Err(Error::Internal(format!(
-                    "{:?} is not an analytic terrain",
-                    spec.kind
-                )));
+                return Err(Error::Internal(format!("{:?} is not an analytic terrain", spec.kind)));
             }
         })
     }
@@ -100,25 +96,17 @@ impl Analytic {
         let q = x * x + y * y;
         match *self {
             Self::Flat => 0.0,
-            Self::Rippled {
-                amplitude,
-                wavelength,
-            } => {
+            Self::Rippled { amplitude, wavelength } => {
                 let k = std::f64::consts::TAU / wavelength;
                 amplitude * (k * x).sin() * (k * y).sin()
             }
-            Self::Conic {
-                slope,
-                radius,
-                tip,
-                foot,
-            } => slope * foot * softplus((radius - (q + tip * tip).sqrt()) / foot),
+            Self::Conic { slope, radius, tip, foot } => {
+                slope * foot * softplus((radius - (q + tip * tip).sqrt()) / foot)
+            }
             Self::Hilly { height, width } => height * (-0.5 * q / (width * width)).exp(),
-            Self::Pit {
-                depth,
-                radius,
-                edge,
-            } => -0.5 * depth * (1.0 - ((q - radius * radius) / (2.0 * radius * edge)).tanh()),
+            Self::Pit { depth, radius, edge } => {
+                -0.5 * depth * (1.0 - ((q - radius * radius) / (2.0 * radius * edge)).tanh())
+            }
         }
     }
 }

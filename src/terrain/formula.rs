@@ -43,11 +43,8 @@ const FUNCTIONS_OF_TWO: [(&str, Binary); 5] = [
     ("mod", f64::rem_euclid),
 ];
 
-const CONSTANTS: [(&str, f64); 3] = [
-    ("pi", std::f64::consts::PI),
-    ("tau", std::f64::consts::TAU),
-    ("e", std::f64::consts::E),
-];
+const CONSTANTS: [(&str, f64); 3] =
+    [("pi", std::f64::consts::PI), ("tau", std::f64::consts::TAU), ("e", std::f64::consts::E)];
 
 /// A parsed expression in x and y.
 pub struct Formula {
@@ -75,21 +72,12 @@ impl Formula {
                 text.len()
             )));
         }
-        let mut parser = Parser {
-            text,
-            position: 0,
-            depth: 0,
-        };
+        let mut parser = Parser { text, position: 0, depth: 0 };
         let root = parser.sum()?;
         match parser.peek() {
-            None => Ok(Self {
-                text: text.into(),
-                root,
-            }),
+            None => Ok(Self { text: text.into(), root }),
             Some(')') => Err(parser.error("this ')' closes nothing")),
-            Some(_) => {
-                Err(parser.error("an operator is missing here (multiplication is written *)"))
-            }
+            Some(_) => Err(parser.error("an operator is missing here (multiplication is written *)")),
         }
     }
 
@@ -210,17 +198,14 @@ impl Parser<'_> {
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_alphabetic() || c == '_' => self.name(),
-            Some(_) => {
-                Err(self.error("a number, x, y, a function or a parenthesis should stand here"))
-            }
+            Some(_) => Err(self.error("a number, x, y, a function or a parenthesis should stand here")),
             None => Err(self.error("something is missing at the end")),
         }
     }
 
     fn number(&mut self) -> Result<Node> {
         let rest = &self.text[self.position..];
-        let digits =
-            |from: usize| from + rest[from..].bytes().take_while(u8::is_ascii_digit).count();
+        let digits = |from: usize| from + rest[from..].bytes().take_while(u8::is_ascii_digit).count();
         let mut end = digits(0);
         if rest[end..].starts_with('.') {
             end = digits(end + 1);
@@ -232,18 +217,14 @@ impl Parser<'_> {
                 end = exponent;
             }
         }
-        let value = rest[..end]
-            .parse()
-            .map_err(|_| self.error("this is not a number"))?;
+        let value = rest[..end].parse().map_err(|_| self.error("this is not a number"))?;
         self.position += end;
         Ok(Node::Number(value))
     }
 
     fn name(&mut self) -> Result<Node> {
         let rest = &self.text[self.position..];
-        let end = rest
-            .find(|c: char| !c.is_alphanumeric() && c != '_')
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
         let name = &rest[..end];
         let unknown = self.error(&format!(
             "{name:?} is unknown; there are the variables x and y, the constants {}, and the functions {}, {}",
@@ -294,10 +275,7 @@ impl Parser<'_> {
 
     fn error(&self, what: &str) -> Error {
         let column = self.text[..self.position].chars().count() + 1;
-        Error::input(format!(
-            "terrain.expression {:?}, character {column}: {what}",
-            self.text
-        ))
+        Error::input(format!("terrain.expression {:?}, character {column}: {what}", self.text))
     }
 }
 
@@ -306,11 +284,7 @@ fn binary(f: Binary, left: Node, right: Node) -> Node {
 }
 
 fn names<T>(table: &[(&str, T)]) -> String {
-    table
-        .iter()
-        .map(|(name, _)| *name)
-        .collect::<Vec<_>>()
-        .join(" ")
+    table.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -333,10 +307,7 @@ mod tests {
             ("1e-3*x + 1.5E2 + .5 + 2.", 1e-3 * x + 152.5),
             ("0.1*sin(2*x)*cos(y)", 0.1 * (2.0 * x).sin() * y.cos()),
             ("max(x, y) + min(0, y) - abs(y)", x + y + y),
-            (
-                "atan2(y, x) + hypot(x, y) + mod(y, 1)",
-                y.atan2(x) + x.hypot(y) + 0.4,
-            ),
+            ("atan2(y, x) + hypot(x, y) + mod(y, 1)", y.atan2(x) + x.hypot(y) + 0.4),
             ("cos(PI) + ln(e) + tau", std::f64::consts::TAU),
             ("sign(y) + sign(0)", -1.0),
             ("((x))", x),
@@ -344,10 +315,7 @@ mod tests {
         ];
         for (text, expected) in cases {
             let value = Formula::parse(text).unwrap().height(x, y).unwrap();
-            assert!(
-                (value - expected).abs() < 1e-12,
-                "{text}: {value} against {expected}"
-            );
+            assert!((value - expected).abs() < 1e-12, "{text}: {value} against {expected}");
         }
     }
 
@@ -379,10 +347,7 @@ mod tests {
             (&long, "at most 2000"),
         ];
         for (text, part) in cases {
-            let message = Formula::parse(text)
-                .err()
-                .map(|e| e.to_string())
-                .unwrap_or_default();
+            let message = Formula::parse(text).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(message.contains(part), "{text:?}: {message}");
         }
     }
@@ -390,11 +355,7 @@ mod tests {
     #[test]
     fn values_that_are_no_heights_are_refused_with_their_place() {
         for text in ["1/x", "ln(x)", "sqrt(x-1)", "0/x", "exp(1000 + x)"] {
-            let message = Formula::parse(text)
-                .unwrap()
-                .height(0.0, 0.25)
-                .unwrap_err()
-                .to_string();
+            let message = Formula::parse(text).unwrap().height(0.0, 0.25).unwrap_err().to_string();
             assert!(message.contains("at x = 0.0000, y = 0.2500"), "{message}");
         }
     }

@@ -28,11 +28,7 @@ pub struct Raster {
 /// The ground of a heightmap.
 pub fn build(spec: &TerrainSpec, base_dir: &Path) -> Result<Ground> {
     let name = required(spec, "file", spec.file.as_deref())?;
-    let spacing = in_range(
-        "spacing",
-        required(spec, "spacing", spec.spacing)?,
-        [1e-4, 10.0],
-    )?;
+    let spacing = in_range("spacing", required(spec, "spacing", spec.spacing)?, [1e-4, 10.0])?;
     let origin = spec.origin.unwrap_or_default();
     for coordinate in origin {
         in_range("origin", coordinate, [-1e5, 1e5])?;
@@ -53,17 +49,11 @@ pub fn build(spec: &TerrainSpec, base_dir: &Path) -> Result<Ground> {
     } else if bytes.starts_with(npy::SIGNATURE) {
         npy::decode(&bytes)
     } else {
-        Err(Error::input(
-            "this is neither a PNG image nor an .npy array",
-        ))
+        Err(Error::input("this is neither a PNG image nor an .npy array"))
     }
     .map_err(|e| Error::input(format!("terrain.file {name:?}: {e}")))?;
 
-    let Raster {
-        columns,
-        rows,
-        values,
-    } = raster;
+    let Raster { columns, rows, values } = raster;
     let half = |count: usize| 0.5 * spacing * (count - 1) as f64;
     let grid = Grid {
         origin: [origin[0] - half(columns), origin[1] - half(rows)],
@@ -72,20 +62,9 @@ pub fn build(spec: &TerrainSpec, base_dir: &Path) -> Result<Ground> {
         rows,
     };
     // Upside down: the file's first row is the largest y.
-    let heights: Vec<f64> = values
-        .chunks_exact(columns)
-        .rev()
-        .flatten()
-        .map(|v| v * scale)
-        .collect();
-    let mut ground = scan::ground(
-        spec,
-        &format!("terrain.file {name:?}"),
-        Scan { grid, heights },
-    )?;
-    ground
-        .inputs
-        .push((name.into(), hex(&Sha256::digest(&bytes))));
+    let heights: Vec<f64> = values.chunks_exact(columns).rev().flatten().map(|v| v * scale).collect();
+    let mut ground = scan::ground(spec, &format!("terrain.file {name:?}"), Scan { grid, heights })?;
+    ground.inputs.push((name.into(), hex(&Sha256::digest(&bytes))));
     Ok(ground)
 }
 
@@ -101,10 +80,7 @@ fn read(path: &Path, name: &str) -> Result<Vec<u8>> {
         return Err(complain("this is not a file".into()));
     }
     if about.len() > MAX_FILE {
-        return Err(complain(format!(
-            "{} bytes are too many; at most {MAX_FILE}",
-            about.len()
-        )));
+        return Err(complain(format!("{} bytes are too many; at most {MAX_FILE}", about.len())));
     }
     fs::read(path).map_err(|e| complain(e.to_string()))
 }
@@ -116,10 +92,7 @@ pub fn check_size(columns: u64, rows: u64) -> Result<()> {
             "{columns} x {rows} cells are too few: at least {MIN_SIDE} x {MIN_SIDE}"
         )));
     }
-    if columns
-        .checked_mul(rows)
-        .is_none_or(|cells| cells > MAX_CELLS)
-    {
+    if columns.checked_mul(rows).is_none_or(|cells| cells > MAX_CELLS) {
         return Err(Error::input(format!(
             "{columns} x {rows} cells are too many: at most {MAX_CELLS} in all; reduce its resolution or cut out a part"
         )));

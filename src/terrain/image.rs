@@ -24,9 +24,7 @@ pub fn decode(bytes: &[u8]) -> Result<Raster> {
     // Palettes to colours, few bits to eight, a transparent colour to an alpha channel.
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(complain)?;
-    let size = reader
-        .output_buffer_size()
-        .ok_or_else(|| Error::input("the image is too large"))?;
+    let size = reader.output_buffer_size().ok_or_else(|| Error::input("the image is too large"))?;
     let mut buffer = vec![0; size];
     let frame = reader.next_frame(&mut buffer).map_err(complain)?;
 
@@ -53,9 +51,5 @@ pub fn decode(bytes: &[u8]) -> Result<Raster> {
             sample(first)
         }
     };
-    Ok(Raster {
-        columns,
-        rows,
-        values: (0..columns * rows).map(value).collect(),
-    })
+    Ok(Raster { columns, rows, values: (0..columns * rows).map(value).collect() })
 }

@@ -101,10 +101,7 @@ fn sampled(spec: &TerrainSpec, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Gr
     let grid = *field.grid();
     for row in 0..grid.rows - 1 {
         for column in 0..grid.columns - 1 {
-            let (x, y) = (
-                grid.x(column) + 0.5 * grid.spacing[0],
-                grid.y(row) + 0.5 * grid.spacing[1],
-            );
+            let (x, y) = (grid.x(column) + 0.5 * grid.spacing[0], grid.y(row) + 0.5 * grid.spacing[1]);
             error.add(x, y, field.height(x, y) - h(x, y)?);
         }
     }
@@ -116,12 +113,7 @@ fn sampled(spec: &TerrainSpec, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Gr
             error.max, error.at[0], error.at[1]
         ));
     }
-    Ok(Ground {
-        field,
-        raw: None,
-        report,
-        inputs: Vec::new(),
-    })
+    Ok(Ground { field, raw: None, report, inputs: Vec::new() })
 }
 
 /// Differences between the spline and its source.
@@ -187,20 +179,11 @@ fn allowed_keys(kind: TerrainKind) -> &'static [&'static str] {
     match kind {
         TerrainKind::Flat => &["extent", "spacing"],
         TerrainKind::Rippled => &["level", "amplitude", "wavelength", "extent", "spacing"],
-        TerrainKind::Conic => &[
-            "level", "slope", "radius", "tip", "foot", "extent", "spacing",
-        ],
+        TerrainKind::Conic => &["level", "slope", "radius", "tip", "foot", "extent", "spacing"],
         TerrainKind::Hilly => &["level", "height", "width", "extent", "spacing"],
         TerrainKind::Pit => &["level", "depth", "radius", "edge", "extent", "spacing"],
         TerrainKind::Formula => &["expression", "extent", "spacing"],
-        TerrainKind::Heightmap => &[
-            "file",
-            "spacing",
-            "height_scale",
-            "smoothing",
-            "origin",
-            "extent",
-        ],
+        TerrainKind::Heightmap => &["file", "spacing", "height_scale", "smoothing", "origin", "extent"],
         TerrainKind::Mesh => &["file", "spacing", "smoothing", "extent"],
     }
 }
@@ -228,10 +211,7 @@ fn check_keys(spec: &TerrainSpec) -> Result<()> {
         ("extent", spec.extent.is_some()),
     ];
     let allowed = allowed_keys(spec.kind);
-    match given
-        .iter()
-        .find(|(key, given)| *given && !allowed.contains(key))
-    {
+    match given.iter().find(|(key, given)| *given && !allowed.contains(key)) {
         None => Ok(()),
         Some((key, _)) => Err(Error::input(format!(
             "terrain.{key} does not belong to kind {:?}; allowed there: {}",
@@ -248,10 +228,7 @@ fn kind_name(kind: TerrainKind) -> String {
 /// The value of a key that its kind cannot do without.
 fn required<T>(spec: &TerrainSpec, key: &str, value: Option<T>) -> Result<T> {
     value.ok_or_else(|| {
-        Error::input(format!(
-            "terrain.{key} is missing: kind {:?} needs it",
-            kind_name(spec.kind)
-        ))
+        Error::input(format!("terrain.{key} is missing: kind {:?} needs it", kind_name(spec.kind)))
     })
 }
 
@@ -260,7 +237,5 @@ fn in_range(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
     if (low..=high).contains(&value) {
         return Ok(value);
     }
-    Err(Error::input(format!(
-        "terrain.{key} = {value} is out of range: between {low} and {high}"
-    )))
+    Err(Error::input(format!("terrain.{key} = {value} is out of range: between {low} and {high}")))
 }

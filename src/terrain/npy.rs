@@ -35,15 +35,9 @@ pub fn decode(bytes: &[u8]) -> Result<Raster> {
     }
     let values = match order {
         Order::C => stored,
-        Order::Fortran => (0..columns * rows)
-            .map(|i| stored[(i % columns) * rows + i / columns])
-            .collect(),
+        Order::Fortran => (0..columns * rows).map(|i| stored[(i % columns) * rows + i / columns]).collect(),
     };
-    Ok(Raster {
-        columns,
-        rows,
-        values,
-    })
+    Ok(Raster { columns, rows, values })
 }
 
 /// All elements in the order they are stored, as f64.
@@ -61,8 +55,7 @@ fn numbers(header: NpyHeader, data: &[u8]) -> Result<std::io::Result<Vec<f64>>> 
     let file = NpyFile::with_header(header, data);
     macro_rules! read {
         ($number:ty) => {
-            file.into_vec::<$number>()
-                .map(|values| values.into_iter().map(|v| v as f64).collect())
+            file.into_vec::<$number>().map(|values| values.into_iter().map(|v| v as f64).collect())
         };
     }
     Ok(match (kind.type_char(), kind.size_field()) {

@@ -27,10 +27,7 @@ pub struct Scan {
 
 /// Fills, smooths, interpolates, crops and refines, and reports what it did. `name` is the file, for messages.
 pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
-    let Scan {
-        grid,
-        heights: measured,
-    } = scan;
+    let Scan { grid, heights: measured } = scan;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
     let smoothing = smoothing_length(spec, &grid)?;
@@ -47,13 +44,7 @@ pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
     }
     let holes: Vec<bool> = measured.iter().map(|h| h.is_nan()).collect();
     let smoothed = smooth(grid.columns, &filled, &holes, smoothing / spacing);
-    let whole = Heightfield::interpolate(
-        grid.origin,
-        grid.spacing,
-        grid.columns,
-        grid.rows,
-        &smoothed,
-    )?;
+    let whole = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &smoothed)?;
 
     let fine = refined_spacing(extent, spacing);
     let field = if extent == grid.extent() && fine == spacing {
@@ -61,12 +52,7 @@ pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
     } else {
         Heightfield::from_function(extent, fine, |x, y| Ok(whole.height(x, y)))?
     };
-    let place = |x: f64, y: f64| {
-        (
-            (x - grid.origin[0]) / spacing,
-            (y - grid.origin[1]) / spacing,
-        )
-    };
+    let place = |x: f64, y: f64| ((x - grid.origin[0]) / spacing, (y - grid.origin[1]) / spacing);
     let raw = field.grid().sample(|x, y| {
         let (column, row) = place(x, y);
         Ok(bilinear(grid.columns, &filled, column, row))
@@ -83,12 +69,7 @@ pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
     report.notes = notes(spec, &grid, holes_filled, smoothing, &report);
-    Ok(Ground {
-        field,
-        raw: Some(raw),
-        report,
-        inputs: Vec::new(),
-    })
+    Ok(Ground { field, raw: Some(raw), report, inputs: Vec::new() })
 }
 
 fn notes(
@@ -116,12 +97,7 @@ fn notes(
     if report.grid != [grid.columns, grid.rows] {
         notes.push(format!(
             "{} x {} cells of {:.4} m became {} x {} of {:.4} m by the spline",
-            grid.columns,
-            grid.rows,
-            grid.spacing[0],
-            report.grid[0],
-            report.grid[1],
-            report.spacing[0]
+            grid.columns, grid.rows, grid.spacing[0], report.grid[0], report.grid[1], report.spacing[0]
         ));
     }
     notes
@@ -135,11 +111,7 @@ fn cropped(wanted: Option<[f64; 4]>, whole: [f64; 4]) -> Result<[f64; 4]> {
     // A tenth of a millimetre is a rounding of the user's, not a wish.
     let slack = 1e-4;
     let inside = (0..4).all(|k| {
-        let outwards = if k % 2 == 0 {
-            whole[k] - wanted[k]
-        } else {
-            wanted[k] - whole[k]
-        };
+        let outwards = if k % 2 == 0 { whole[k] - wanted[k] } else { wanted[k] - whole[k] };
         outwards <= slack
     });
     if !inside {
@@ -149,22 +121,14 @@ fn cropped(wanted: Option<[f64; 4]>, whole: [f64; 4]) -> Result<[f64; 4]> {
             whole[0], whole[1], whole[2], whole[3]
         )));
     }
-    Ok(std::array::from_fn(|k| {
-        if k % 2 == 0 {
-            wanted[k].max(whole[k])
-        } else {
-            wanted[k].min(whole[k])
-        }
-    }))
+    Ok(std::array::from_fn(|k| if k % 2 == 0 { wanted[k].max(whole[k]) } else { wanted[k].min(whole[k]) }))
 }
 
 /// The standard deviation of the smoothing, m: as given, or by default.
 fn smoothing_length(spec: &TerrainSpec, grid: &Grid) -> Result<f64> {
     let spacing = grid.spacing[0];
     let Some(length) = spec.smoothing else {
-        return Ok((SMOOTHING_CELLS * spacing)
-            .max(SMOOTHING_LENGTH)
-            .min(SMOOTHING_LIMIT * spacing));
+        return Ok((SMOOTHING_CELLS * spacing).max(SMOOTHING_LENGTH).min(SMOOTHING_LIMIT * spacing));
     };
     super::in_range("smoothing", length, [0.0, SMOOTHING_LIMIT * spacing])
 }
@@ -176,9 +140,5 @@ fn refined_spacing([x_min, x_max, y_min, y_max]: [f64; 4], spacing: f64) -> f64 
     }
     let fine = spacing / (spacing / FINE_SPACING - 1e-9).ceil();
     let nodes = ((x_max - x_min) / fine + 2.0) * ((y_max - y_min) / fine + 2.0);
-    if nodes > MAX_SAMPLES as f64 {
-        spacing
-    } else {
-        fine
-    }
+    if nodes > MAX_SAMPLES as f64 { spacing } else { fine }
 }

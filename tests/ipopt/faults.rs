@@ -13,13 +13,7 @@ use crate::problems::{Hs071, go_on, run};
 #[test]
 fn a_panic_in_the_problem_reaches_the_caller() {
     let expected = run(&mut Hs071::new(true), &Options::new()).unwrap();
-    for function in [
-        "objective",
-        "gradient",
-        "constraints",
-        "jacobian",
-        "hessian",
-    ] {
+    for function in ["objective", "gradient", "constraints", "jacobian", "hessian"] {
         for at_call in [1, 4] {
             let mut problem = Hs071::new(true);
             let (mut calls, mut total_after) = (0, 0);
@@ -45,22 +39,13 @@ fn a_panic_in_the_problem_reaches_the_caller() {
 #[test]
 fn a_panic_in_the_iteration_callback_reaches_the_caller() {
     let result = catch_unwind(AssertUnwindSafe(|| {
-        solve(
-            &mut Hs071::new(true),
-            &Options::new(),
-            None,
-            &mut |record, _| {
-                assert!(record.iteration < 2, "enough");
-                ControlFlow::Continue(())
-            },
-        )
+        solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, _| {
+            assert!(record.iteration < 2, "enough");
+            ControlFlow::Continue(())
+        })
     }));
     let payload = result.expect_err("the panic goes on");
-    assert!(
-        payload
-            .downcast_ref::<&str>()
-            .is_some_and(|text| text.contains("enough"))
-    );
+    assert!(payload.downcast_ref::<&str>().is_some_and(|text| text.contains("enough")));
 }
 
 #[test]
@@ -77,26 +62,11 @@ fn a_solve_inside_a_solve_is_refused() {
 #[test]
 fn wrong_structures_are_refused() {
     let refusal = |rows| run(&mut Hs071::with_jacobian_rows(rows), &Options::new()).unwrap_err();
-    assert_eq!(
-        refusal(vec![0; 7]),
-        IpoptError::StructureLengths {
-            matrix: "Jacobian",
-            rows: 7,
-            columns: 8
-        }
-    );
+    assert_eq!(refusal(vec![0; 7]), IpoptError::StructureLengths { matrix: "Jacobian", rows: 7, columns: 8 });
     for row in [2, -1, i32::MAX] {
         let error = refusal(vec![0, 0, row, 0, 1, 1, 1, 1]);
         assert!(
-            matches!(
-                error,
-                IpoptError::StructureIndex {
-                    matrix: "Jacobian",
-                    entry: 2,
-                    column: 2,
-                    ..
-                }
-            ),
+            matches!(error, IpoptError::StructureIndex { matrix: "Jacobian", entry: 2, column: 2, .. }),
             "{error}"
         );
     }
@@ -125,10 +95,7 @@ const FINE: Small = Small {
 };
 
 fn fine() -> Small {
-    Small {
-        jacobian: vec![0],
-        ..FINE
-    }
+    Small { jacobian: vec![0], ..FINE }
 }
 
 /// Minimise x² with x within bounds.
@@ -166,19 +133,9 @@ impl NlpProblem for Small {
         out.fill(self.derivative);
     }
     fn hessian_structure(&self) -> Option<(&[i32], &[i32])> {
-        self.hessian
-            .as_ref()
-            .map(|(rows, columns)| (&rows[..], &columns[..]))
+        self.hessian.as_ref().map(|(rows, columns)| (&rows[..], &columns[..]))
     }
-    fn hessian_values(
-        &mut self,
-        _: &[f64],
-        _: bool,
-        factor: f64,
-        _: &[f64],
-        _: bool,
-        out: &mut [f64],
-    ) {
+    fn hessian_values(&mut self, _: &[f64], _: bool, factor: f64, _: &[f64], _: bool, out: &mut [f64]) {
         out.fill(2.0 * factor);
     }
 }
@@ -186,104 +143,38 @@ impl NlpProblem for Small {
 #[test]
 fn mistakes_are_found_before_the_solve() {
     let error = |mut problem: Small| run(&mut problem, &Options::new()).unwrap_err().to_string();
-    assert_eq!(
-        run(&mut fine(), &Options::new()).unwrap().status,
-        Status::Solved
-    );
-    assert_eq!(
-        error(Small {
-            variables: 0,
-            ..fine()
-        }),
-        "the problem has no variables"
-    );
-    assert!(
-        error(Small {
-            start: f64::NAN,
-            ..fine()
-        })
-        .contains("initial variable 0 is NaN")
-    );
-    assert!(
-        error(Small {
-            start: f64::INFINITY,
-            ..fine()
-        })
-        .contains("not a finite number")
-    );
-    for bounds in [
-        [2.0, 1.0],
-        [f64::NAN, 1.0],
-        [0.0, f64::NAN],
-        [f64::INFINITY; 2],
-        [f64::NEG_INFINITY; 2],
-    ] {
+    assert_eq!(run(&mut fine(), &Options::new()).unwrap().status, Status::Solved);
+    assert_eq!(error(Small { variables: 0, ..fine() }), "the problem has no variables");
+    assert!(error(Small { start: f64::NAN, ..fine() }).contains("initial variable 0 is NaN"));
+    assert!(error(Small { start: f64::INFINITY, ..fine() }).contains("not a finite number"));
+    for bounds in [[2.0, 1.0], [f64::NAN, 1.0], [0.0, f64::NAN], [f64::INFINITY; 2], [f64::NEG_INFINITY; 2]] {
         assert!(error(Small { bounds, ..fine() }).starts_with("variable 0 has the bounds"));
-        let problem = Small {
-            constraint_bounds: bounds,
-            ..fine()
-        };
+        let problem = Small { constraint_bounds: bounds, ..fine() };
         assert!(error(problem).starts_with("constraint 0 has the bounds"));
     }
-    assert!(
-        error(Small {
-            jacobian: vec![],
-            ..fine()
-        })
-        .contains("Jacobian is empty")
-    );
-    let upper_triangle = Small {
-        hessian: Some((vec![0], vec![1])),
-        ..fine()
-    };
+    assert!(error(Small { jacobian: vec![], ..fine() }).contains("Jacobian is empty"));
+    let upper_triangle = Small { hessian: Some((vec![0], vec![1])), ..fine() };
     assert!(error(upper_triangle).contains("entry 0 of the Hessian is at row 0, column 1"));
-    let uneven = Small {
-        hessian: Some((vec![0], vec![])),
-        ..fine()
-    };
+    let uneven = Small { hessian: Some((vec![0], vec![])), ..fine() };
     assert!(error(uneven).contains("the Hessian has 1 row indices but 0 column indices"));
 }
 
 #[test]
 fn wrong_multipliers_are_refused() {
-    let right = Multipliers {
-        constraint: vec![0.0],
-        lower: vec![0.0],
-        upper: vec![0.0],
-    };
-    let attempt =
-        |given: &Multipliers| solve(&mut fine(), &Options::new(), Some(given), &mut go_on);
+    let right = Multipliers { constraint: vec![0.0], lower: vec![0.0], upper: vec![0.0] };
+    let attempt = |given: &Multipliers| solve(&mut fine(), &Options::new(), Some(given), &mut go_on);
     assert!(attempt(&right).is_ok());
-    let short = attempt(&Multipliers {
-        lower: vec![],
-        ..right.clone()
-    });
-    assert!(matches!(
-        short,
-        Err(IpoptError::MultiplierCount {
-            expected: 1,
-            actual: 0,
-            ..
-        })
-    ));
-    let nan = attempt(&Multipliers {
-        constraint: vec![f64::NAN],
-        ..right
-    });
+    let short = attempt(&Multipliers { lower: vec![], ..right.clone() });
+    assert!(matches!(short, Err(IpoptError::MultiplierCount { expected: 1, actual: 0, .. })));
+    let nan = attempt(&Multipliers { constraint: vec![f64::NAN], ..right });
     assert!(matches!(nan, Err(IpoptError::NotFinite { .. })));
 }
 
 /// Also one in the Jacobian, which Ipopt by default does not look at.
 #[test]
 fn nan_in_a_derivative_is_reported() {
-    let problem = &mut Small {
-        derivative: f64::NAN,
-        ..fine()
-    };
-    assert_eq!(
-        run(problem, &Options::new()).unwrap().status,
-        Status::InvalidNumber
-    );
+    let problem = &mut Small { derivative: f64::NAN, ..fine() };
+    assert_eq!(run(problem, &Options::new()).unwrap().status, Status::InvalidNumber);
 }
 
 #[test]
@@ -310,28 +201,17 @@ fn wrong_options_are_refused() {
         Options::new().set_str("mu_strategy", "adapt\0ive"),
     ] {
         let error = attempt(refused.clone()).unwrap_err();
-        assert!(
-            matches!(error, IpoptError::OptionRejected { .. }),
-            "{refused:?}: {error}"
-        );
-        assert!(matches!(
-            warpgait::Error::from(error),
-            warpgait::Error::Input(_)
-        ));
+        assert!(matches!(error, IpoptError::OptionRejected { .. }), "{refused:?}: {error}");
+        assert!(matches!(warpgait::Error::from(error), warpgait::Error::Input(_)));
     }
     let reserved = Options::new().set_str("option_file_name", "ipopt.opt");
-    assert_eq!(
-        attempt(reserved),
-        Err(IpoptError::OptionReserved("option_file_name".into()))
-    );
+    assert_eq!(attempt(reserved), Err(IpoptError::OptionReserved("option_file_name".into())));
     let exact = Options::new().set_str("hessian_approximation", "exact");
     assert_eq!(attempt(exact), Err(IpoptError::NoHessian));
 }
 
 #[test]
 fn of_two_settings_the_later_one_counts() {
-    let options = Options::new()
-        .set_int("max_iter", 0)
-        .set_int("max_iter", 100);
+    let options = Options::new().set_int("max_iter", 0).set_int("max_iter", 100);
     assert_eq!(run(&mut fine(), &options).unwrap().status, Status::Solved);
 }

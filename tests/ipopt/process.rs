@@ -15,12 +15,7 @@ use crate::problems::{Circle, Hs071, run};
 
 fn child(name: &str, directory: &Path) -> Command {
     let mut command = Command::new(std::env::current_exe().expect("a test knows its program"));
-    command.args([
-        &format!("process::{name}"),
-        "--exact",
-        "--ignored",
-        "--nocapture",
-    ]);
+    command.args([&format!("process::{name}"), "--exact", "--ignored", "--nocapture"]);
     command.current_dir(directory);
     command
 }
@@ -29,24 +24,16 @@ fn child(name: &str, directory: &Path) -> Command {
 #[test]
 fn no_option_file_is_read_and_nothing_is_printed() {
     let directory = tempfile::tempdir().unwrap();
-    std::fs::write(
-        directory.path().join("ipopt.opt"),
-        "max_iter 1\nprint_level 5\n",
-    )
-    .unwrap();
-    let output = child("solve_in_silence", directory.path())
-        .output()
-        .unwrap();
+    std::fs::write(directory.path().join("ipopt.opt"), "max_iter 1\nprint_level 5\n").unwrap();
+    let output = child("solve_in_silence", directory.path()).output().unwrap();
     let stdout = String::from_utf8(output.stdout).unwrap();
     let of_the_test_program = |line: &&str| {
         *line == "running 1 test"
             || *line == "test process::solve_in_silence ... ok"
             || line.starts_with("test result: ok. 1 passed")
     };
-    let other: Vec<&str> = stdout
-        .lines()
-        .filter(|line| !line.is_empty() && !of_the_test_program(line))
-        .collect();
+    let other: Vec<&str> =
+        stdout.lines().filter(|line| !line.is_empty() && !of_the_test_program(line)).collect();
     assert_eq!(other, Vec::<&str>::new());
     assert_eq!(String::from_utf8_lossy(&output.stderr), "");
     assert!(output.status.success());
@@ -70,20 +57,14 @@ fn solve_in_silence() {
         assert!(run(&mut Hs071::new(true), &refused).is_err());
     }
     // A linear solver that is not installed is found out only when the solve begins.
-    let absent = run(
-        &mut Hs071::new(true),
-        &Options::new().set_str("linear_solver", "ma27"),
-    );
+    let absent = run(&mut Hs071::new(true), &Options::new().set_str("linear_solver", "ma27"));
     assert_eq!(absent.unwrap().status, Status::InvalidOption);
 }
 
 #[test]
 fn the_flag_interrupts() {
     let directory = tempfile::tempdir().unwrap();
-    let status = child("interrupt_by_flag", directory.path())
-        .output()
-        .unwrap()
-        .status;
+    let status = child("interrupt_by_flag", directory.path()).output().unwrap().status;
     assert!(status.success());
 }
 
@@ -91,54 +72,35 @@ fn the_flag_interrupts() {
 #[ignore = "run by the_flag_interrupts"]
 fn interrupt_by_flag() {
     let mut seen = Vec::new();
-    let solution = solve(
-        &mut Hs071::new(true),
-        &Options::new(),
-        None,
-        &mut |record, x| {
-            seen = x.to_vec();
-            if record.iteration == 4 {
-                assert!(!INTERRUPT.raise());
-            }
-            ControlFlow::Continue(())
-        },
-    )
+    let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+        seen = x.to_vec();
+        if record.iteration == 4 {
+            assert!(!INTERRUPT.raise());
+        }
+        ControlFlow::Continue(())
+    })
     .unwrap();
     assert_eq!(solution.status, Status::Interrupted);
     assert_eq!(solution.history.len(), 5);
     assert_eq!(solution.x, seen);
     // It stays raised until it is lowered.
     let again = run(&mut Hs071::new(true), &Options::new()).unwrap();
-    assert_eq!(
-        (again.status, again.history.len()),
-        (Status::Interrupted, 1)
-    );
+    assert_eq!((again.status, again.history.len()), (Status::Interrupted, 1));
     INTERRUPT.lower();
-    assert_eq!(
-        run(&mut Hs071::new(true), &Options::new()).unwrap().status,
-        Status::Solved
-    );
+    assert_eq!(run(&mut Hs071::new(true), &Options::new()).unwrap().status, Status::Solved);
 }
 
 /// Starts the child and waits until it says that it is inside a solve.
 fn start_and_wait_for_solve(name: &str, directory: &Path) -> Child {
-    let mut child = child(name, directory)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = child(name, directory).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let lines = BufReader::new(child.stdout.as_mut().unwrap()).lines();
-    let ready = lines
-        .map_while(Result::ok)
-        .any(|line| line.contains("solving"));
+    let ready = lines.map_while(Result::ok).any(|line| line.contains("solving"));
     assert!(ready, "the child ended before its solve");
     child
 }
 
 fn press_ctrl_c(child: &Child) {
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.unwrap().success());
 }
 
@@ -184,10 +146,7 @@ fn a_second_ctrl_c_ends_the_program() {
     let mut child = start_and_wait_for_solve("hang", directory.path());
     press_ctrl_c(&child);
     thread::sleep(Duration::from_millis(200));
-    assert!(
-        child.try_wait().unwrap().is_none(),
-        "the first Ctrl-C waits for the iteration"
-    );
+    assert!(child.try_wait().unwrap().is_none(), "the first Ctrl-C waits for the iteration");
     press_ctrl_c(&child);
     assert_eq!(wait(&mut child).code(), Some(130));
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use warpgait::ipopt::{IterationRecord, Mode, NlpProblem, Options, Solution, Status, solve};
 
-use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, go_on, run};
+use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, Wavy, go_on, run};
 
 #[track_caller]
 fn assert_is_hs071(solution: &Solution) {
@@ -20,13 +20,7 @@ fn assert_is_hs071(solution: &Solution) {
 
 /// Everything but the times.
 fn without_times(history: &[IterationRecord]) -> Vec<IterationRecord> {
-    history
-        .iter()
-        .map(|record| IterationRecord {
-            seconds: 0.0,
-            ..record.clone()
-        })
-        .collect()
+    history.iter().map(|record| IterationRecord { seconds: 0.0, ..record.clone() }).collect()
 }
 
 #[test]
@@ -41,16 +35,11 @@ fn hs071_with_the_exact_hessian() {
     problem.gradient(&solution.x, true, &mut gradient);
     problem.jacobian_values(&solution.x, false, &mut jacobian);
     for i in 0..4 {
-        let pull: f64 = (0..2)
-            .map(|c| jacobian[4 * c + i] * solution.constraint_multipliers[c])
-            .sum();
+        let pull: f64 = (0..2).map(|c| jacobian[4 * c + i] * solution.constraint_multipliers[c]).sum();
         let bounds = solution.upper_multipliers[i] - solution.lower_multipliers[i];
         assert!((gradient[i] + pull + bounds).abs() < 1e-6);
     }
-    assert!(
-        solution.lower_multipliers[0] > 1.0,
-        "the lower bound of x₀ is active"
-    );
+    assert!(solution.lower_multipliers[0] > 1.0, "the lower bound of x₀ is active");
 }
 
 #[test]
@@ -80,12 +69,7 @@ fn an_infeasible_problem_is_called_so() {
     let solution = run(&mut Circle { right_side: -1.0 }, &Options::new()).unwrap();
     assert_eq!(solution.status, Status::Infeasible);
     assert!(!solution.status.converged());
-    assert!(
-        solution
-            .history
-            .iter()
-            .any(|record| record.mode == Mode::Restoration)
-    );
+    assert!(solution.history.iter().any(|record| record.mode == Mode::Restoration));
     assert!((solution.history.last().unwrap().violation - 1.0).abs() < 1e-3);
 }
 
@@ -102,34 +86,18 @@ fn the_point_shown_is_the_current_iterate() {
         restorations += usize::from(record.mode == Mode::Restoration);
         ControlFlow::Continue(())
     };
-    solve(
-        &mut Circle { right_side: -1.0 },
-        &Options::new(),
-        None,
-        &mut modes,
-    )
-    .unwrap();
+    solve(&mut Circle { right_side: -1.0 }, &Options::new(), None, &mut modes).unwrap();
     assert!(restorations > 0);
     let mut count = 0;
-    let solution = solve(
-        &mut Hs071::new(true),
-        &Options::new(),
-        None,
-        &mut |record, x| {
-            assert_eq!(record.iteration, count);
-            count += 1;
-            assert!((Hs071::new(true).objective(x, true) - record.objective).abs() < 1e-9);
-            ControlFlow::Continue(())
-        },
-    )
+    let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+        assert_eq!(record.iteration, count);
+        count += 1;
+        assert!((Hs071::new(true).objective(x, true) - record.objective).abs() < 1e-9);
+        ControlFlow::Continue(())
+    })
     .unwrap();
     assert_eq!(solution.history.len(), count);
-    assert!(
-        solution
-            .history
-            .windows(2)
-            .all(|pair| pair[0].seconds <= pair[1].seconds)
-    );
+    assert!(solution.history.windows(2).all(|pair| pair[0].seconds <= pair[1].seconds));
 }
 
 /// Even if Ipopt scales the constraints: 1000 times larger, their violation is 1000 times larger.
@@ -144,19 +112,10 @@ fn the_violation_is_unscaled() {
 fn the_callback_can_stop_at_its_point() {
     for stop_at in [0, 3] {
         let mut seen = Vec::new();
-        let solution = solve(
-            &mut Hs071::new(true),
-            &Options::new(),
-            None,
-            &mut |record, x| {
-                seen = x.to_vec();
-                if record.iteration == stop_at {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            },
-        )
+        let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+            seen = x.to_vec();
+            if record.iteration == stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
         .unwrap();
         assert_eq!(solution.status, Status::StoppedByCallback);
         assert_eq!(solution.history.len(), stop_at + 1);
@@ -177,21 +136,14 @@ fn the_callback_can_stop_in_the_restoration_phase() {
     let solution = solve(&mut problem, &Options::new(), None, &mut |record, x| {
         seen = x.to_vec();
         restorations += usize::from(record.mode == Mode::Restoration);
-        if restorations == 3 {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        if restorations == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .unwrap();
     assert_eq!(restorations, 3);
     assert_eq!(solution.status, Status::StoppedByCallback);
     assert_eq!(solution.x, seen);
     assert_eq!(solution.objective, seen[0] + seen[1]);
-    assert_eq!(
-        solution.constraints[0],
-        seen[0] * seen[0] + seen[1] * seen[1]
-    );
+    assert_eq!(solution.constraints[0], seen[0] * seen[0] + seen[1] * seen[1]);
 }
 
 #[test]
@@ -200,10 +152,7 @@ fn the_same_solve_twice_takes_the_same_iterations() {
     let first = run(&mut Hs071::new(false), &options).unwrap();
     let second = run(&mut Hs071::new(false), &options).unwrap();
     assert_eq!(first.x, second.x);
-    assert_eq!(
-        without_times(&first.history),
-        without_times(&second.history)
-    );
+    assert_eq!(without_times(&first.history), without_times(&second.history));
 }
 
 #[test]
@@ -220,16 +169,9 @@ fn a_warm_start_needs_fewer_iterations() {
     let warm = solve(&mut problem, &near, Some(&cold.multipliers()), &mut go_on).unwrap();
     assert_is_hs071(&warm);
     let lengths = [&warm, &without, &cold].map(|solution| solution.history.len());
-    assert!(
-        lengths[0] < lengths[1] && lengths[0] < lengths[2],
-        "{lengths:?}"
-    );
+    assert!(lengths[0] < lengths[1] && lengths[0] < lengths[2], "{lengths:?}");
     // The multipliers were really read: the first iterate is as good as the last one was.
-    assert!(
-        warm.history[0].dual_infeasibility < 1e-6,
-        "{:?}",
-        warm.history[0]
-    );
+    assert!(warm.history[0].dual_infeasibility < 1e-6, "{:?}", warm.history[0]);
 }
 
 #[test]
@@ -256,11 +198,7 @@ fn time_in_the_problem_is_measured() {
 
 #[test]
 fn limits_are_reported() {
-    let solution = run(
-        &mut Hs071::new(true),
-        &Options::new().set_int("max_iter", 2),
-    )
-    .unwrap();
+    let solution = run(&mut Hs071::new(true), &Options::new().set_int("max_iter", 2)).unwrap();
     assert_eq!(solution.status, Status::MaxIterations);
     assert_eq!(solution.status.to_string(), "iteration limit reached");
     assert_eq!(solution.history.len(), 3);
@@ -271,4 +209,28 @@ fn limits_are_reported() {
     });
     let solution = run(&mut problem, &Options::new().set_num("max_cpu_time", 0.02)).unwrap();
     assert_eq!(solution.status, Status::MaxCpuTime);
+}
+
+/// On problems with long line searches and restorations too: the point shown is the current iterate, and `new_x` is
+/// never false for an x that the problem has not seen.
+#[test]
+fn rough_problems_see_the_right_points() {
+    let (mut iterations, mut restorations, mut solved) = (0, 0, 0);
+    for seed in 0..20 {
+        let strategy = if seed % 2 == 0 { "adaptive" } else { "monotone" };
+        let options = Options::new().set_str("mu_strategy", strategy).set_int("max_iter", 100);
+        let (mut problem, mut check) = (Wavy::new(20, seed), Wavy::new(20, seed));
+        let solution = solve(&mut problem, &options, None, &mut |record, x| {
+            let objective = check.objective(x, true);
+            assert!((objective - record.objective).abs() < 1e-8 * (1.0 + objective.abs()));
+            iterations += 1;
+            restorations += usize::from(record.mode == Mode::Restoration);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        solved += usize::from(solution.status.converged());
+        assert_eq!(problem.false_new_x, 0);
+    }
+    println!("{iterations} iterations, {restorations} of them restoration, {solved} of 20 solved");
+    assert!(restorations > 20 && solved > 0);
 }

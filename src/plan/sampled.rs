@@ -1,0 +1,241 @@
+//! A plan from a motion: everything at ten times the rate of the NLP's samples, in ambient space.
+
+use std::collections::BTreeMap;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+
+use super::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan, Seconds, WarpedSamples};
+use crate::nlp::model::GRAVITY;
+use crate::nlp::solve::Motion;
+use crate::robot::Robot;
+use crate::scenario::{Formulation, Scenario};
+use crate::terrain::Ground;
+use crate::trajectory::sampling;
+use crate::trajectory::space::Space;
+
+/// Samples of a plan within one time step.
+pub const SAMPLES_A_STEP: usize = 10;
+
+/// What a plan carries besides the motion.
+pub struct Provenance<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// The scenario's text.
+    pub text: &'a str,
+    /// The robot.
+    pub robot: &'a Robot,
+    /// The ground.
+    pub ground: &'a Ground,
+    /// Files that went in, by name, with their SHA-256.
+    pub inputs: BTreeMap<String, String>,
+    /// s spent on the map.
+    pub map_seconds: f64,
+}
+
+impl Plan {
+    /// Samples a motion. `checks` are left empty.
+    pub fn from_motion(motion: &Motion, provenance: &Provenance) -> Self {
+        let (model, x) = (&motion.model, &motion.x);
+        let (layout, space) = (&model.layout, &model.space);
+        let count = layout.intervals * SAMPLES_A_STEP + 1;
+        let unit = model.mass * GRAVITY;
+        let warped = space.is_warped();
+        let mut plan = Self::empty(motion, provenance);
+        let mut samples = WarpedSamples {
+            base_position: vec![],
+            base_euler: vec![],
+            foot_position: vec![],
+            foot_force: vec![],
+        };
+        let mut last = UnitQuaternion::identity();
+        for n in 0..count {
+            let k = n as f64 / SAMPLES_A_STEP as f64;
+            let base = sampling::base(layout, space, x, k);
+            let mut q =
+                UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(base.rotation));
+            if n > 0 && q.coords.dot(&last.coords) < 0.0 {
+                q = UnitQuaternion::new_unchecked(-q.into_inner());
+            }
+            last = q;
+            plan.t.push(k * layout.time_step);
+            plan.base_position.push(base.position.into());
+            plan.base_quaternion_wxyz.push([q.w, q.i, q.j, q.k]);
+            plan.base_linear_velocity.push(base.velocity.into());
+            plan.base_linear_acceleration.push(base.acceleration.into());
+            plan.base_angular_velocity.push(base.angular_velocity.into());
+            plan.base_angular_acceleration.push(base.angular_acceleration.into());
+            let [px, py, pz, roll, pitch, yaw] = base.variables;
+            samples.base_position.push([px, py, pz]);
+            samples.base_euler.push([roll, pitch, yaw]);
+            for i in 0..model.feet() {
+                let foot = sampling::foot(layout, space, x, i, k);
+                plan.foot_position.push(foot.position.into());
+                plan.foot_velocity.push(foot.velocity.into());
+                plan.foot_acceleration.push(foot.acceleration.into());
+                plan.foot_force.push((foot.force * unit).into());
+                plan.foot_contact.push(foot.contact);
+                plan.foot_normal.push(model.ground.normal(foot.position.x, foot.position.y));
+                samples.foot_position.push(foot.warped_position.into());
+                samples.foot_force.push((foot.warped_force * unit).into());
+            }
+        }
+        plan.warped = warped.then_some(samples);
+        plan
+    }
+
+    /// Everything but the samples.
+    fn empty(motion: &Motion, provenance: &Provenance) -> Self {
+        let (model, scenario, robot) = (&motion.model, provenance.scenario, provenance.robot);
+        let field = &provenance.ground.field;
+        let grid = field.grid();
+        let step = model.layout.time_step;
+        let phase_durations = model
+            .layout
+            .feet
+            .iter()
+            .map(|foot| {
+                let edges: Vec<usize> =
+                    foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
+                edges.windows(2).map(|e| (e[1] - e[0]) as f64 * step).collect()
+            })
+            .collect();
+        let history =
+            |value: fn(&crate::ipopt::IterationRecord) -> f64| motion.history.iter().map(value).collect();
+        Self {
+            t: vec![],
+            base_position: vec![],
+            base_quaternion_wxyz: vec![],
+            base_linear_velocity: vec![],
+            base_linear_acceleration: vec![],
+            base_angular_velocity: vec![],
+            base_angular_acceleration: vec![],
+            foot_position: vec![],
+            foot_velocity: vec![],
+            foot_acceleration: vec![],
+            foot_force: vec![],
+            foot_contact: vec![],
+            foot_normal: vec![],
+            foot_names: model.foot_names.clone(),
+            foot_adhesive: model.adhesive.clone(),
+            warped: None,
+            phase_durations,
+            splines: splines(motion),
+            ground: GroundGrid {
+                rows: grid.rows,
+                columns: grid.columns,
+                origin: grid.origin,
+                spacing: grid.spacing,
+                height: field.samples().to_vec(),
+                raw: provenance.ground.raw.clone(),
+            },
+            map: match &model.space {
+                Space::Direct => None,
+                Space::Warped(map) => Some(map.to_grid()),
+            },
+            history_objective: history(|r| r.objective),
+            history_constraint_violation: history(|r| r.violation),
+            history_seconds: history(|r| r.seconds),
+            meta: Meta {
+                schema: 1,
+                warpgait_version: env!("CARGO_PKG_VERSION").into(),
+                created: rfc3339(SystemTime::now()),
+                formulation: match scenario.formulation {
+                    Formulation::Warped => "warped".into(),
+                    Formulation::Direct => "direct".into(),
+                },
+                sample_rate_hz: SAMPLES_A_STEP as f64 / step,
+                scenario: provenance.text.into(),
+                robot: MetaRobot {
+                    name: robot.name.clone(),
+                    mass: robot.mass,
+                    inertia: robot.inertia,
+                    friction: scenario.contact.friction,
+                    gravity: [0.0, 0.0, -GRAVITY],
+                    reach: model.reach.clone(),
+                    torso: robot.torso,
+                },
+                solver: MetaSolver {
+                    status: motion.status.clone(),
+                    success: motion.solved,
+                    iterations: motion.iterations,
+                    max_violation: motion.max_violation(),
+                    seconds: Seconds {
+                        map: provenance.map_seconds,
+                        total: motion.seconds.total + provenance.map_seconds,
+                        ..motion.seconds
+                    },
+                },
+                checks: vec![],
+                inputs: provenance.inputs.clone(),
+            },
+        }
+    }
+}
+
+/// The variables by set, in the space they were optimised in (forces in N), with the knots of each spline.
+fn splines(motion: &Motion) -> Vec<(String, Vec<usize>, Vec<f64>)> {
+    let (model, x) = (&motion.model, &motion.x);
+    let layout = &model.layout;
+    let (step, intervals) = (layout.time_step, layout.intervals);
+    let unit = model.mass * GRAVITY;
+    let points = intervals + 3;
+    let base = (0..points).flat_map(|i| x[layout.base_block(i)..][..6].to_vec()).collect();
+    // Uniform knots: control point i has the support [t_i, t_{i+4}], t_3 = 0.
+    let knots = (0..points + 4).map(|i| (i as f64 - 3.0) * step).collect();
+    let mut splines = vec![
+        ("base_control_points".to_string(), vec![points, 6], base),
+        ("base_knots".to_string(), vec![points + 4], knots),
+    ];
+    for (name, foot) in model.foot_names.iter().zip(&layout.feet) {
+        let footholds: Vec<f64> = foot.stances.iter().flat_map(|s| s.foothold.value::<3>(x)).collect();
+        splines.push((format!("{name}_footholds"), vec![foot.stances.len(), 3], footholds));
+        let swings: Vec<f64> =
+            foot.swings.iter().flat_map(|s| x[s.control_points..s.control_points + 9].to_vec()).collect();
+        splines.push((format!("{name}_swing_control_points"), vec![foot.swings.len(), 3, 3], swings));
+        let mut forces = vec![0.0; 3 * (intervals + 1)];
+        for stance in &foot.stances {
+            for (k, node) in stance.free_forces() {
+                let force = Vector3::from(node.value::<3>(x)) * unit;
+                forces[3 * k..3 * k + 3].copy_from_slice(force.as_slice());
+            }
+        }
+        splines.push((format!("{name}_force_nodes"), vec![intervals + 1, 3], forces));
+    }
+    splines.push((
+        "force_knots".to_string(),
+        vec![intervals + 1],
+        (0..=intervals).map(|k| k as f64 * step).collect(),
+    ));
+    splines
+}
+
+/// Seconds since 1970 as a date and time of day, UTC (the civil-from-days formula).
+fn rfc3339(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, rest) = (seconds / 86400, seconds % 86400);
+    let z = days as i64 + 719_468;
+    let era = z.div_euclid(146_097);
+    let day_of_era = z.rem_euclid(146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let m = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * m + 2) / 5 + 1;
+    let month = if m < 10 { m + 3 } else { m - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", rest / 3600, rest / 60 % 60, rest % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn dates_are_right_around_leap_days() {
+        let at = |s: u64| rfc3339(UNIX_EPOCH + Duration::from_secs(s));
+        assert_eq!(at(0), "1970-01-01T00:00:00Z");
+        assert_eq!(at(951_827_696), "2000-02-29T12:34:56Z");
+        assert_eq!(at(1_709_251_199), "2024-02-29T23:59:59Z");
+    }
+}
