@@ -107,7 +107,10 @@ impl Robot {
         let moments = inertia.symmetric_eigenvalues();
         let largest = moments.max();
         if moments.min() <= 0.0 {
-            return refuse(format!("principal moments {:.4?} kg m², allowed: all positive", moments.as_slice()));
+            return refuse(format!(
+                "principal moments {:.4?} kg m², allowed: all positive",
+                moments.as_slice()
+            ));
         }
         if 2.0 * largest > moments.sum() * (1.0 + 1e-6) {
             let what = "allowed: none larger than the sum of the other two (no body has such an inertia)";
@@ -161,7 +164,11 @@ mod tests {
             ("-0.000938112, 0.00595386", "0.1, 0.00595386", "symmetric"),
             ("\"RF\"", "\"LF\"", "no other foot"),
             ("nominal = [0.34, 0.19, -0.42]", "nominal = [1.34, 0.19, -0.42]", "outside the foot's reach"),
-            ("half_size = [0.32, 0.14, 0.10]", "half_size = [0.32, 0.0, 0.10]", "torso.half_size[1]: given 0.0"),
+            (
+                "half_size = [0.32, 0.14, 0.10]",
+                "half_size = [0.32, 0.0, 0.10]",
+                "torso.half_size[1]: given 0.0",
+            ),
         ] {
             let message = changed(from, to).expect_err(to).to_string();
             assert!(message.contains(expected), "{message}");

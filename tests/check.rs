@@ -10,7 +10,8 @@ const WEIGHT: f64 = MASS * GRAVITY;
 
 fn failed(plan: &Plan) -> Vec<String> {
     let report = check(plan).unwrap();
-    let failed: Vec<String> = report.rows.iter().filter(|row| !row.passed).map(|row| row.name.clone()).collect();
+    let failed: Vec<String> =
+        report.rows.iter().filter(|row| !row.passed).map(|row| row.name.clone()).collect();
     assert_eq!(report.passed, failed.is_empty());
     failed
 }
@@ -29,7 +30,9 @@ fn good_plans_pass_everything() {
     }
     let report = check(&lifting(0.08)).unwrap();
     let least = report.figures.iter().find(|row| row.name == "swing_apex_least").unwrap();
-    assert!((least.value - 80.0).abs() < 0.1 && least.foot.as_deref() == Some("LF") && least.time == Some(0.5));
+    assert!(
+        (least.value - 80.0).abs() < 0.1 && least.foot.as_deref() == Some("LF") && least.time == Some(0.5)
+    );
     assert_eq!(report.residuals.newton.len(), 201);
 }
 
@@ -39,7 +42,10 @@ fn laws_of_motion() {
     assert_eq!(broken(standing(), |p| p.meta.robot.mass *= 1.02), ["newton_rms"]);
     assert_eq!(broken(standing(), |p| p.meta.robot.mass *= 1.05), ["newton_rms", "newton_max"]);
     // One bad sample.
-    assert_eq!(broken(standing(), |p| p.foot_force[4 * 100][2] += 0.04 * WEIGHT), ["newton_max", "euler_max"]);
+    assert_eq!(
+        broken(standing(), |p| p.foot_force[4 * 100][2] += 0.04 * WEIGHT),
+        ["newton_max", "euler_max"]
+    );
     // Weight on the front feet, the centre of mass between all four.
     let front_heavy = |p: &mut Plan| {
         for (i, force) in p.foot_force.iter_mut().enumerate() {
@@ -82,21 +88,31 @@ fn a_turning_body_needs_torque() {
 #[test]
 fn derivatives_must_be_derivatives() {
     assert_eq!(broken(standing(), |p| p.base_linear_velocity.fill([0.0, 0.05, 0.0])), ["linear_consistency"]);
-    assert_eq!(broken(standing(), |p| p.base_angular_velocity.fill([0.0, 0.0, 0.05])), ["angular_consistency"]);
+    assert_eq!(
+        broken(standing(), |p| p.base_angular_velocity.fill([0.0, 0.0, 0.05])),
+        ["angular_consistency"]
+    );
     assert_eq!(broken(standing(), |p| p.foot_velocity[4 * 100] = [0.18, 0.0, 0.0]), ["foot_consistency"]);
-    assert_eq!(broken(standing(), |p| p.base_quaternion_wxyz[100..].fill([-1.0, 0.0, 0.0, 0.0])), ["quaternion"]);
+    assert_eq!(
+        broken(standing(), |p| p.base_quaternion_wxyz[100..].fill([-1.0, 0.0, 0.0, 0.0])),
+        ["quaternion"]
+    );
 }
 
 #[test]
 fn feet_and_ground() {
     let sunk = |p: &mut Plan| p.foot_position.iter_mut().for_each(|x| x[2] -= 0.002);
     assert_eq!(broken(standing(), sunk), ["stance_gap"]);
-    let drifting = |p: &mut Plan| (0..201).for_each(|n| p.foot_position[4 * n + 1][0] += 0.0005 * n as f64 / 200.0);
+    let drifting =
+        |p: &mut Plan| (0..201).for_each(|n| p.foot_position[4 * n + 1][0] += 0.0005 * n as f64 / 200.0);
     assert_eq!(broken(standing(), drifting), ["stance_slip"]);
     assert_eq!(broken(lifting(0.08), |p| p.foot_position[4 * 51][2] = -0.00015), ["swing_penetration"]);
     assert_eq!(failed(&lifting(0.05)), ["swing_apex_shortfall"]);
     let tilt = 0.0175_f64;
-    assert_eq!(broken(standing(), |p| p.foot_normal[7] = [tilt, 0.0, (1.0 - tilt * tilt).sqrt()]), ["normal"]);
+    assert_eq!(
+        broken(standing(), |p| p.foot_normal[7] = [tilt, 0.0, (1.0 - tilt * tilt).sqrt()]),
+        ["normal"]
+    );
     assert_eq!(broken(on_slope(0.05), |p| ask(p, "contact", "max_slope = 0.02")), ["foothold_slope"]);
     let narrow = |p: &mut Plan| {
         p.ground.columns = 47;
@@ -153,7 +169,10 @@ fn forces() {
 fn the_body() {
     let raise = |p: &mut Plan| p.base_position.iter_mut().for_each(|x| x[2] += 0.105);
     assert_eq!(broken(standing(), raise), ["reach"]);
-    assert_eq!(broken(standing(), |p| ask(p, "motion", "base_clearance = 0.33")), ["base_clearance_shortfall"]);
+    assert_eq!(
+        broken(standing(), |p| ask(p, "motion", "base_clearance = 0.33")),
+        ["base_clearance_shortfall"]
+    );
     // A bump under the middle of the belly, where no corner is.
     let bump = |p: &mut Plan| p.ground.height[20 * 81 + 40] = 0.25;
     assert_eq!(broken(standing(), bump), ["base_clearance_shortfall"]);
@@ -186,7 +205,8 @@ fn every_law_of_the_table_is_reported() {
     ask(&mut plan, "contact", "max_slope = 1.0");
     plan.meta.scenario = plan.meta.scenario.replace("[goal]", "[goal]\nyaw = 0.0");
     let report = check(&plan).unwrap();
-    let mut reported: Vec<&str> = report.rows.iter().chain(&report.figures).map(|row| row.name.as_str()).collect();
+    let mut reported: Vec<&str> =
+        report.rows.iter().chain(&report.figures).map(|row| row.name.as_str()).collect();
     let mut known: Vec<&str> = LAWS.iter().map(|law| law.name).collect();
     reported.sort();
     known.sort();
@@ -221,7 +241,9 @@ fn limits_can_be_changed() {
     assert!(message.contains("did you mean `newton_rms`?"), "{message}");
     assert!(read("newton_rms = nan").is_err() && read("newton_rms = \"a\"").is_err() && read("= 3").is_err());
     let strict = check_with(&standing(), &Limits::new(true)).unwrap();
-    assert!(strict.passed && strict.rows.iter().any(|row| row.name == "angular_speed_max" && row.limit == 1.0));
+    assert!(
+        strict.passed && strict.rows.iter().any(|row| row.name == "angular_speed_max" && row.limit == 1.0)
+    );
 }
 
 #[test]

@@ -8,7 +8,8 @@ use assert_cmd::Command;
 use serde_json::Value;
 
 fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("warpgait").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let output =
+        Command::cargo_bin("warpgait").unwrap().current_dir(folder).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -91,7 +92,12 @@ fn check_tells_good_from_bad() {
     let (code, out, _) = warpgait(folder.path(), &["check", "low.plan.npz", "--json"]);
     let object: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((code, &object["passed"]), (1, &Value::Bool(false)));
-    let row = object["checks"].as_array().unwrap().iter().find(|row| row["name"] == "swing_apex_shortfall").unwrap();
+    let row = object["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|row| row["name"] == "swing_apex_shortfall")
+        .unwrap();
     assert_eq!((&row["passed"], &row["foot"]), (&Value::Bool(false), &Value::from("LF")));
 
     std::fs::write(folder.path().join("limits.toml"), "swing_apex_shortfall = 30\n").unwrap();
@@ -130,7 +136,9 @@ fn check_refuses_bad_input() {
 
     let (code, out, _) = warpgait(folder.path(), &["check", "half.plan.npz", "--json"]);
     assert_eq!(code, 2);
-    assert!(serde_json::from_str::<Value>(&out).unwrap()["error"].as_str().unwrap().contains("half.plan.npz"));
+    assert!(
+        serde_json::from_str::<Value>(&out).unwrap()["error"].as_str().unwrap().contains("half.plan.npz")
+    );
 }
 
 #[cfg(unix)]

@@ -99,13 +99,17 @@ fn every_missing_member_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(folder.path(), &full_plan());
     let mut archive = zip::ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
-    let names: Vec<String> =
-        (0..archive.len()).map(|i| archive.by_index(i).unwrap().name().trim_end_matches(".npy").to_owned()).collect();
+    let names: Vec<String> = (0..archive.len())
+        .map(|i| archive.by_index(i).unwrap().name().trim_end_matches(".npy").to_owned())
+        .collect();
     // Members whose absence means that the plan has no such part.
     let optional = ["warped_base_position", "spline/base_position", "heightfield_raw", "map_control_points"];
     for name in names.iter().filter(|name| !optional.contains(&name.as_str())) {
         let message = refusal(&rewrite(&path, |n, bytes| (n != name).then_some(bytes)));
-        assert!(message.contains("b.plan.npz") && message.contains(&format!("`{name}`: missing")), "{message}");
+        assert!(
+            message.contains("b.plan.npz") && message.contains(&format!("`{name}`: missing")),
+            "{message}"
+        );
     }
 }
 
@@ -121,9 +125,11 @@ fn wrong_shape_dtype_and_values_are_named() {
     assert!(message.contains("`base_position`: shape (3,), expected (201, 3)"), "{message}");
     let message = replaced("foot_contact", &|npz| npz.add_f64("x", &[201, 4], [0.0; 804]).unwrap());
     assert!(message.contains("`foot_contact`: dtype <f8, expected bool"), "{message}");
-    let message = replaced("heightfield_origin", &|npz| npz.add_f64("x", &[2], [0.0, f64::INFINITY]).unwrap());
+    let message =
+        replaced("heightfield_origin", &|npz| npz.add_f64("x", &[2], [0.0, f64::INFINITY]).unwrap());
     assert!(message.contains("`heightfield_origin`: inf at [1]"), "{message}");
-    let message = replaced("phase_durations", &|npz| npz.add_f64("x", &[4, 2], [f64::NAN, 1.0].repeat(4)).unwrap());
+    let message =
+        replaced("phase_durations", &|npz| npz.add_f64("x", &[4, 2], [f64::NAN, 1.0].repeat(4)).unwrap());
     assert!(message.contains("`phase_durations`: NaN at [0, 0]"), "{message}");
     let message = replaced("meta", &|npz| npz.add_str("x", &[], &["{\"schema\": 2}".into()]).unwrap());
     assert!(message.contains("`meta`: schema 2 is newer than 1"), "{message}");

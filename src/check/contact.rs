@@ -50,8 +50,8 @@ fn swings(s: &Subject, findings: &mut Vec<Finding>) {
             }
             if begin > 0 && n > begin && n < s.samples {
                 let heights = (begin..n).map(|k| (1e3 * height_over_ground(s, k, e), k));
-                let (apex, at) =
-                    heights.fold((f64::NEG_INFINITY, begin), |best, one| if one.0 > best.0 { one } else { best });
+                let (apex, at) = heights
+                    .fold((f64::NEG_INFINITY, begin), |best, one| if one.0 > best.0 { one } else { best });
                 shortfall.meet(clearance - apex, at, Some(e));
                 if least.is_none_or(|known| apex < known.value) {
                     least = Some(Worst { value: apex, sample: Some(at), foot: Some(e) });
@@ -68,7 +68,8 @@ fn swings(s: &Subject, findings: &mut Vec<Finding>) {
 fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let motion = &s.scenario.motion;
     let share = 100.0 / s.weight;
-    let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] = [Worst::default(); 6];
+    let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
+        [Worst::default(); 6];
     residuals.friction = vec![0.0; s.samples];
     for (n, e) in s.sample_feet() {
         let force = s.foot_force(n, e);

@@ -5,7 +5,9 @@
 //! p(t−h) − 2p(t) + p(t+h) = h² ∫ hat(s) p̈(t+s) ds, so that the law holds for it with the forces averaged by the same
 //! hat; Simpson's rule (1, 4, 1)/6 does this to fourth order. The larger residual counts.
 
-use super::{Finding, Residuals, Subject, Worst, add, cross, dot, laws, norm, rms, rotate, rotate_back, scale, sub};
+use super::{
+    Finding, Residuals, Subject, Worst, add, cross, dot, laws, norm, rms, rotate, rotate_back, scale, sub,
+};
 
 /// Length that makes a torque comparable with a weight, m.
 const LEVER: f64 = 0.3;
@@ -81,8 +83,10 @@ fn euler(s: &Subject, torques: &[[f64; 3]]) -> Vec<f64> {
     (0..s.samples)
         .map(|n| {
             let (q, omega) = (plan.base_quaternion_wxyz[n], plan.base_angular_velocity[n]);
-            let change =
-                add(inertia_times(s, q, plan.base_angular_acceleration[n]), cross(omega, inertia_times(s, q, omega)));
+            let change = add(
+                inertia_times(s, q, plan.base_angular_acceleration[n]),
+                cross(omega, inertia_times(s, q, omega)),
+            );
             let stated = norm(sub(change, torques[n]));
             let differenced = if n == 0 || n + 1 == s.samples {
                 0.0
@@ -130,7 +134,8 @@ fn consistency(s: &Subject, findings: &mut Vec<Finding>) {
     let linear: Vec<f64> = inner
         .clone()
         .map(|n| {
-            let acceleration = sub(difference(&plan.base_linear_velocity, n), hat(&plan.base_linear_acceleration, n));
+            let acceleration =
+                sub(difference(&plan.base_linear_velocity, n), hat(&plan.base_linear_acceleration, n));
             // A velocity error that lasts a tenth of a second is one of acceleration, so that one figure serves.
             let velocity = sub(difference(&plan.base_position, n), hat(&plan.base_linear_velocity, n));
             100.0 * norm(acceleration).max(norm(velocity) / 0.1) / gravity
@@ -142,7 +147,8 @@ fn consistency(s: &Subject, findings: &mut Vec<Finding>) {
     let angular: Vec<f64> = inner
         .clone()
         .map(|n| {
-            let acceleration = sub(difference(&plan.base_angular_velocity, n), hat(&plan.base_angular_acceleration, n));
+            let acceleration =
+                sub(difference(&plan.base_angular_velocity, n), hat(&plan.base_angular_acceleration, n));
             let turned = scale(0.5 / s.step, rotation_between(q[n - 1], q[n + 1]));
             let velocity = sub(turned, hat(&plan.base_angular_velocity, n));
             norm(acceleration).max(norm(velocity) / 0.1)

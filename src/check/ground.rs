@@ -137,7 +137,8 @@ mod tests {
     use super::*;
 
     fn sampled(n: usize, spacing: f64, h: impl Fn(f64, f64) -> f64) -> GroundGrid {
-        let height = (0..n * n).map(|i| h((i % n) as f64 * spacing - 1.0, (i / n) as f64 * spacing - 1.0)).collect();
+        let height =
+            (0..n * n).map(|i| h((i % n) as f64 * spacing - 1.0, (i / n) as f64 * spacing - 1.0)).collect();
         GroundGrid { rows: n, columns: n, origin: [-1.0; 2], spacing: [spacing; 2], height, raw: None }
     }
 

@@ -103,7 +103,9 @@ impl<'a> Subject<'a> {
         let gravity = norm(plan.meta.robot.gravity);
         let weight = plan.meta.robot.mass * gravity;
         if !(weight.is_finite() && weight > 0.0) {
-            return Err(Error::input(format!("meta.robot: mass times gravity is {weight} N, expected more than 0")));
+            return Err(Error::input(format!(
+                "meta.robot: mass times gravity is {weight} N, expected more than 0"
+            )));
         }
         let samples = plan.t.len();
         let step = (plan.t[samples - 1] - plan.t[0]) / (samples - 1) as f64;

@@ -18,7 +18,8 @@ fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
         let relative = sub(s.foot_position(n, e), s.plan.base_position[n]);
         let body = rotate_back(s.plan.base_quaternion_wxyz[n], relative);
         let limits = &s.plan.meta.robot.reach[e];
-        let beyond = std::array::from_fn(|k| ((body[k] - limits.center[k]).abs() - limits.half_size[k]).max(0.0));
+        let beyond =
+            std::array::from_fn(|k| ((body[k] - limits.center[k]).abs() - limits.half_size[k]).max(0.0));
         let distance = 1e3 * norm(beyond);
         worst.meet(distance, n, Some(e));
         residuals.reach[n] = residuals.reach[n].max(distance);

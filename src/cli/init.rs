@@ -42,6 +42,7 @@ pub(super) fn init(arguments: &InitArguments, console: &Console) -> Result<Endin
 
 pub(super) fn schema(console: &Console) -> Result<Ending> {
     let schema = scenario::json_schema();
-    console.always(&serde_json::to_string_pretty(&schema).map_err(|e| Error::Internal(format!("schema: {e}")))?);
+    console
+        .always(&serde_json::to_string_pretty(&schema).map_err(|e| Error::Internal(format!("schema: {e}")))?);
     Ok(Ending::Good)
 }

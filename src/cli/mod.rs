@@ -7,6 +7,9 @@
 mod check;
 mod console;
 mod init;
+mod map;
+mod progress;
+mod solve;
 mod validate;
 
 use std::ffi::OsString;
@@ -15,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::Result;
+use crate::{Error, Result, ipopt};
 use console::Console;
 
 /// How a command ended, when it was not an error.
@@ -25,6 +28,8 @@ enum Ending {
     Good,
     /// 1: there is a result, and it is not good enough.
     NotGood,
+    /// 130: Ctrl-C.
+    Interrupted,
     /// The exit code of another program.
     Code(u8),
 }
@@ -32,6 +37,9 @@ enum Ending {
 const EXAMPLES: &str = "\
 Examples:
   warpgait init hill                            write hill.toml, a commented scenario
+  warpgait solve hill.toml --plot               plan it: hill.plan.npz and hill.svg
+  warpgait solve hill.toml --set gait.kind=trot --formulation direct -o trot.plan.npz
+  warpgait map hill.toml                        build and judge the warp map alone
   warpgait check hill.plan.npz                  recompute every law of a plan
   warpgait check hill.plan.npz --plot hill.svg  and draw the residuals over time
   warpgait validate hill.plan.npz               replay it in MuJoCo
@@ -58,6 +66,10 @@ enum Command {
     Init(init::InitArguments),
     /// Print the JSON Schema of scenario files, for editors
     Schema,
+    /// Plan a motion: terrain, map, NLP, plan, check
+    Solve(solve::SolveArguments),
+    /// Build and judge the warp map of a scenario alone
+    Map(map::MapArguments),
     /// Recompute every law of a plan in ambient space, on the plan's own samples
     Check(check::CheckArguments),
     /// Replay a plan on the full robot in MuJoCo (needs the Python package)
@@ -82,6 +94,10 @@ pub fn run() -> ExitCode {
     match execute(arguments.command, &console) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::NotGood) => ExitCode::from(1),
+        Ok(Ending::Interrupted) => {
+            console.note("interrupted");
+            ExitCode::from(130)
+        }
         Ok(Ending::Code(code)) => ExitCode::from(code),
         Err(error) => {
             console.error(&error);
@@ -94,6 +110,8 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
     match command {
         Command::Init(arguments) => init::init(&arguments, console),
         Command::Schema => init::schema(console),
+        Command::Solve(arguments) => solve::solve(&arguments, console),
+        Command::Map(arguments) => map::map(&arguments, console),
         Command::Check(arguments) => check::check(&arguments, console),
         Command::Validate { arguments } => validate::validate(&arguments, console),
     }
@@ -104,4 +122,9 @@ fn beside(plan: &std::path::Path, ending: &str) -> PathBuf {
     let name = plan.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let stem = name.strip_suffix(".plan.npz").or(name.strip_suffix(".npz")).unwrap_or(&name);
     plan.with_file_name(format!("{stem}{ending}"))
+}
+
+/// From now on Ctrl-C stops the work at its next iteration, a second one the program.
+fn listen_for_ctrl_c() -> Result<()> {
+    ipopt::install_ctrl_c().map_err(|e| Error::Internal(e.to_string()))
 }

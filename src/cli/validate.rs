@@ -9,7 +9,8 @@ use super::console::Console;
 use crate::{Error, Result};
 
 /// Exits with 0 when Python finds the package; does not import it, which would take a second.
-const HAS_PACKAGE: &str = "import importlib.util, sys; sys.exit(importlib.util.find_spec('warpgait') is None)";
+const HAS_PACKAGE: &str =
+    "import importlib.util, sys; sys.exit(importlib.util.find_spec('warpgait') is None)";
 
 pub(super) fn validate(arguments: &[OsString], console: &Console) -> Result<Ending> {
     let Some(python) = candidates().into_iter().find(|python| has_package(python)) else {

@@ -28,14 +28,24 @@ impl NpzWriter {
     }
 
     /// Adds a float64 array; `values` in C order, as many as the shape says.
-    pub fn add_f64(&mut self, name: &str, shape: &[usize], values: impl IntoIterator<Item = f64>) -> Result<()> {
+    pub fn add_f64(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item = f64>,
+    ) -> Result<()> {
         self.add(name, shape, "<f8", |item: &mut dyn FnMut(&f64) -> std::io::Result<()>| {
             values.into_iter().try_for_each(|v| item(&v))
         })
     }
 
     /// Adds an array of points, shape `(…, K)`.
-    pub fn add_points<const K: usize>(&mut self, name: &str, shape: &[usize], values: &[[f64; K]]) -> Result<()> {
+    pub fn add_points<const K: usize>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: &[[f64; K]],
+    ) -> Result<()> {
         let shape: Vec<usize> = shape.iter().copied().chain([K]).collect();
         self.add_f64(name, &shape, values.iter().flatten().copied())
     }
@@ -245,8 +255,8 @@ impl NpzReader {
             Err(e) => return Err(self.error(name, format!("damaged or cut short: {e}"))),
         };
         let mut rest = Cursor::new(&content[..]);
-        let header =
-            npyz::NpyHeader::from_reader(&mut rest).map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
+        let header = npyz::NpyHeader::from_reader(&mut rest)
+            .map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
         let dtype = match header.dtype() {
             DType::Plain(plain) => plain.to_string(),
             other => other.descr(),
@@ -263,7 +273,8 @@ impl NpzReader {
         let bytes = shape.iter().try_fold(width, |product, &n| product.checked_mul(n));
         let available = content.len() - rest.position() as usize;
         if bytes != Some(available) {
-            return Err(self.error(name, format!("{available} bytes of data do not make {} of {dtype}", tuple(&shape))));
+            return Err(self
+                .error(name, format!("{available} bytes of data do not make {} of {dtype}", tuple(&shape))));
         }
         let values = NpyFile::with_header(header, rest).into_vec::<T>().map_err(|e| self.error(name, e))?;
         Ok((shape, values))

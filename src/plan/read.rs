@@ -25,11 +25,15 @@ impl Plan {
         let (shape, foot_names) = npz.str("foot_names")?;
         let e = foot_names.len();
         if shape.len() != 1 || e == 0 {
-            return Err(npz.error("foot_names", format!("shape {shape:?}, expected (E,) with at least one foot")));
+            return Err(
+                npz.error("foot_names", format!("shape {shape:?}, expected (E,) with at least one foot"))
+            );
         }
         if meta.robot.reach.len() != e {
             let reach = meta.robot.reach.len();
-            return Err(npz.error("meta", format!("robot.reach has {reach} boxes for the {e} feet of foot_names")));
+            return Err(
+                npz.error("meta", format!("robot.reach has {reach} boxes for the {e} feet of foot_names"))
+            );
         }
 
         let warped = if npz.has("warped_base_position") {
@@ -88,7 +92,9 @@ fn read_meta(npz: &mut NpzReader) -> Result<Meta> {
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(schema) if schema == u64::from(PLAN_SCHEMA) => {}
         Some(schema) if schema > u64::from(PLAN_SCHEMA) => {
-            let what = format!("schema {schema} is newer than {PLAN_SCHEMA}, the newest known here; update warpgait");
+            let what = format!(
+                "schema {schema} is newer than {PLAN_SCHEMA}, the newest known here; update warpgait"
+            );
             return Err(npz.error("meta", what));
         }
         _ => {
@@ -148,14 +154,24 @@ fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
     if spacing.iter().any(|&s| s <= 0.0) {
         return Err(npz.error("heightfield_spacing", format!("{spacing:?}, expected lengths above 0 m")));
     }
-    let raw = if npz.has("heightfield_raw") { Some(npz.f64("heightfield_raw", &[rows, columns])?) } else { None };
-    Ok(GroundGrid { rows, columns, origin: [origin[0], origin[1]], spacing: [spacing[0], spacing[1]], height, raw })
+    let raw =
+        if npz.has("heightfield_raw") { Some(npz.f64("heightfield_raw", &[rows, columns])?) } else { None };
+    Ok(GroundGrid {
+        rows,
+        columns,
+        origin: [origin[0], origin[1]],
+        spacing: [spacing[0], spacing[1]],
+        height,
+        raw,
+    })
 }
 
 fn read_map(npz: &mut NpzReader) -> Result<MapGrid> {
     let (shape, values) = npz.finite_f64("map_control_points")?;
     let &[nx, ny, nz, 3] = &shape[..] else {
-        return Err(npz.error("map_control_points", format!("shape {shape:?}, expected (Nx+3, Ny+3, Nz+3, 3)")));
+        return Err(
+            npz.error("map_control_points", format!("shape {shape:?}, expected (Nx+3, Ny+3, Nz+3, 3)"))
+        );
     };
     let origin = npz.f64("map_origin", &[3])?;
     let mut knots: [Vec<f64>; 3] = Default::default();

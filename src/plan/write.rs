@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::Plan;
 use super::npz::NpzWriter;
+use super::{MapGrid, Plan};
 use crate::{Error, Result};
 
 impl Plan {
@@ -53,11 +53,7 @@ impl Plan {
             npz.add_f64("heightfield_raw", &shape, raw.iter().copied())?;
         }
         if let Some(map) = &self.map {
-            npz.add_points("map_control_points", &map.shape, &map.control_points)?;
-            npz.add_f64("map_origin", &[3], map.origin)?;
-            for (axis, knots) in ["x", "y", "z"].iter().zip(&map.knots) {
-                npz.add_f64(&format!("map_knots_{axis}"), &[knots.len()], knots.iter().copied())?;
-            }
+            npz.add_map(map)?;
         }
 
         for (name, values) in self.history_members() {
@@ -118,10 +114,22 @@ impl Plan {
         ensure("foot_adhesive", self.foot_adhesive.len() == e, [])?;
         ensure("phase_durations", self.phase_durations.len() == e, self.phase_durations.iter().flatten())?;
         if let Some(warped) = &self.warped {
-            ensure("warped_base_position", warped.base_position.len() == n, warped.base_position.iter().flatten())?;
+            ensure(
+                "warped_base_position",
+                warped.base_position.len() == n,
+                warped.base_position.iter().flatten(),
+            )?;
             ensure("warped_base_euler", warped.base_euler.len() == n, warped.base_euler.iter().flatten())?;
-            ensure("warped_foot_position", warped.foot_position.len() == n * e, warped.foot_position.iter().flatten())?;
-            ensure("warped_foot_force", warped.foot_force.len() == n * e, warped.foot_force.iter().flatten())?;
+            ensure(
+                "warped_foot_position",
+                warped.foot_position.len() == n * e,
+                warped.foot_position.iter().flatten(),
+            )?;
+            ensure(
+                "warped_foot_force",
+                warped.foot_force.len() == n * e,
+                warped.foot_force.iter().flatten(),
+            )?;
         }
         for (name, shape, values) in &self.splines {
             ensure(name, shape.iter().product::<usize>() == values.len(), values)?;
@@ -138,7 +146,11 @@ impl Plan {
         }
         if let Some(map) = &self.map {
             let points = &map.control_points;
-            ensure("map_control_points", points.len() == map.shape.iter().product::<usize>(), points.iter().flatten())?;
+            ensure(
+                "map_control_points",
+                points.len() == map.shape.iter().product::<usize>(),
+                points.iter().flatten(),
+            )?;
             ensure("map_knots", true, map.knots.iter().flatten().chain(&map.origin))?;
         }
         let iterations = self.history_objective.len();
@@ -157,4 +169,16 @@ fn ensure<'a>(name: &str, right_length: bool, values: impl IntoIterator<Item = &
         return Err(Error::Internal(format!("the plan's {name} has a value that is not finite")));
     }
     Ok(())
+}
+
+impl NpzWriter {
+    /// Adds the members of a warp map.
+    pub fn add_map(&mut self, map: &MapGrid) -> Result<()> {
+        self.add_points("map_control_points", &map.shape, &map.control_points)?;
+        self.add_f64("map_origin", &[3], map.origin)?;
+        for (axis, knots) in ["x", "y", "z"].iter().zip(&map.knots) {
+            self.add_f64(&format!("map_knots_{axis}"), &[knots.len()], knots.iter().copied())?;
+        }
+        Ok(())
+    }
 }

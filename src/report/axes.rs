@@ -98,7 +98,11 @@ fn opened([a, b]: [f64; 2]) -> [f64; 2] {
 fn ticks([a, b]: [f64; 2], count: usize) -> (Vec<f64>, usize) {
     let rough = (b - a) / count.max(2) as f64;
     let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|step| *step >= rough).unwrap_or(10.0 * power);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(10.0 * power);
     let slack = 1e-9 * (b - a);
     let values = ((a - slack) / step).ceil() as i64..=((b + slack) / step).floor() as i64;
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;

@@ -8,4 +8,4 @@ pub mod table;
 
 pub use residuals::residuals;
 pub use sheet::sheet;
-pub use table::check_table;
+pub use table::{check_table, derivative_table, map_table, number, violation_table};

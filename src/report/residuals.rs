@@ -10,7 +10,8 @@ use crate::scenario;
 pub fn residuals(plan: &Plan, report: &CheckReport) -> String {
     let r = &report.residuals;
     let limit = |name: &str| report.rows.iter().find(|row| row.name == name).map(|row| row.limit);
-    let clearance = scenario::parse("meta.scenario", &plan.meta.scenario).ok().map(|s| 1e3 * s.motion.base_clearance);
+    let clearance =
+        scenario::parse("meta.scenario", &plan.meta.scenario).ok().map(|s| 1e3 * s.motion.base_clearance);
     let panels = [
         ("Newton's law", "% of m g", &r.newton, limit("newton_max")),
         ("Euler's law", "% of m g · 0.3 m", &r.euler, limit("euler_max")),
@@ -21,7 +22,11 @@ pub fn residuals(plan: &Plan, report: &CheckReport) -> String {
     ];
     let (width, height) = (1000.0, 150.0);
     let mut svg = Svg::new(width, 70.0 + (height + 50.0) * panels.len() as f64);
-    let verdict = if report.passed { "every check holds" } else { "a check fails" };
+    let failed = report.rows.iter().filter(|row| !row.passed).count();
+    let verdict = match failed {
+        0 => format!("all {} checks hold", report.rows.len()),
+        n => format!("{n} of {} checks fail", report.rows.len()),
+    };
     svg.text(
         [70.0, 28.0],
         &format!("Check residuals, {}: {verdict}", plan.meta.robot.name),
@@ -40,7 +45,11 @@ pub fn residuals(plan: &Plan, report: &CheckReport) -> String {
             svg.polyline(points, "stroke=\"#2166ac\" stroke-width=\"1.4\"");
             if let Some(limit) = limit {
                 let ends = time.map(|t| axes.at(t, limit));
-                svg.line(ends[0], ends[1], "stroke=\"#c8352c\" stroke-width=\"1.3\" stroke-dasharray=\"6 4\"");
+                svg.line(
+                    ends[0],
+                    ends[1],
+                    "stroke=\"#c8352c\" stroke-width=\"1.3\" stroke-dasharray=\"6 4\"",
+                );
             }
         });
     }

@@ -28,11 +28,13 @@ fn heading(svg: &mut Svg, plan: &Plan) {
     let [first, last] = [plan.t[0], plan.t[plan.t.len() - 1]];
     let title = format!("{}, {} formulation, {} s", meta.robot.name, meta.formulation, number(last - first));
     svg.text([70.0, 32.0], &title, Font { size: 19.0, ..Font::TITLE });
-    let failed: Vec<&str> = meta.checks.iter().filter(|row| !row.passed).map(|row| row.name.as_str()).collect();
+    let failed: Vec<&str> =
+        meta.checks.iter().filter(|row| !row.passed).map(|row| row.name.as_str()).collect();
     let checks = match (meta.checks.len(), failed.len()) {
         (0, _) => "not checked".to_owned(),
         (n, 0) => format!("all {n} checks hold"),
-        (n, _) => format!("{} of {n} checks fail: {}", failed.len(), failed.join(", ")),
+        (n, 1..=3) => format!("{} of {n} checks fail: {}", failed.len(), failed.join(", ")),
+        (n, _) => format!("{} of {n} checks fail: {}, …", failed.len(), failed[..3].join(", ")),
     };
     let solver = &meta.solver;
     let words = format!(
@@ -79,7 +81,8 @@ fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
             }
         }
         svg.polyline(plan.base_position.iter().map(|p| axes.at(p[0], p[1])), BASE);
-        let [start, end] = [plan.base_position[0], plan.base_position[plan.t.len() - 1]].map(|p| axes.at(p[0], p[1]));
+        let [start, end] =
+            [plan.base_position[0], plan.base_position[plan.t.len() - 1]].map(|p| axes.at(p[0], p[1]));
         svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
         svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
     });
@@ -130,7 +133,8 @@ fn height_range(raster: &[Option<f64>]) -> [f64; 2] {
 fn shading(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
     let heights = raster(axes, ground);
     let [low, high] = height_range(&heights);
-    let level = |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1));
+    let level =
+        |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1));
     let [left, top, width, tall] = axes.frame;
     let (cell_w, cell_h) = (width / RASTER as f64, tall / RASTER as f64);
     for (j, row) in heights.chunks(RASTER).enumerate() {
@@ -170,7 +174,10 @@ fn height_scale(svg: &mut Svg, plan: &Plan, axes: &Axes) {
     let (x, step) = (left + width + 8.0, tall / LEVELS as f64);
     for i in 0..LEVELS {
         let y = top + tall - (i + 1) as f64 * step;
-        svg.rect([x, y, 12.0, step + 0.4], &format!("fill=\"{}\"", ground_colour((i as f64 + 0.5) / LEVELS as f64)));
+        svg.rect(
+            [x, y, 12.0, step + 0.4],
+            &format!("fill=\"{}\"", ground_colour((i as f64 + 0.5) / LEVELS as f64)),
+        );
     }
     let font = Font { size: 11.0, ..Font::TICK }.anchored("start");
     svg.text([x, top - 6.0], &format!("{high:.2} m"), font);
@@ -196,10 +203,16 @@ fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
     svg.clipped(frame, |svg| {
         let floor = axes.y[0];
         let ends = [profile.last(), profile.first()].into_iter().flatten().map(|p| [p[0], floor]);
-        let outline: Vec<[f64; 2]> = profile.iter().copied().chain(ends).map(|[s, z]| axes.at(s, z)).collect();
+        let outline: Vec<[f64; 2]> =
+            profile.iter().copied().chain(ends).map(|[s, z]| axes.at(s, z)).collect();
         svg.polygon(outline, "fill=\"#e6dcc6\" stroke=\"#8a7650\" stroke-width=\"1.2\"");
     });
-    axes.draw(svg, "From the side, ground on the straight line from start to end", "along the way, m", "z, m");
+    axes.draw(
+        svg,
+        "From the side, ground on the straight line from start to end",
+        "along the way, m",
+        "z, m",
+    );
     svg.clipped(frame, |svg| {
         for e in 0..plan.foot_names.len() {
             let path = foot_samples(plan, e).map(|(_, p)| axes.at(along(&p), p[2]));
@@ -229,7 +242,10 @@ fn contacts(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
             }
             if n > begin {
                 let [[x1, _], [x2, _]] = [plan.t[begin], plan.t[n - 1]].map(|t| axes.at(t, 0.0));
-                svg.rect([x1, top + 0.18 * bar, x2 - x1, 0.64 * bar], &format!("fill=\"{}\"", foot_colour(e)));
+                svg.rect(
+                    [x1, top + 0.18 * bar, x2 - x1, 0.64 * bar],
+                    &format!("fill=\"{}\"", foot_colour(e)),
+                );
             }
             n += 1;
         }

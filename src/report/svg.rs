@@ -60,7 +60,9 @@ impl Svg {
     }
 
     pub fn rect(&mut self, [x, y, w, h]: [f64; 4], style: &str) {
-        self.element(format_args!("rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" {style}"));
+        self.element(format_args!(
+            "rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" {style}"
+        ));
     }
 
     pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: &str) {
@@ -68,7 +70,9 @@ impl Svg {
     }
 
     pub fn line(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], style: &str) {
-        self.element(format_args!("line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}"));
+        self.element(format_args!(
+            "line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}"
+        ));
     }
 
     /// A line through points; points too close to be told apart are left out.
@@ -108,7 +112,11 @@ impl Svg {
     pub fn turned_text(&mut self, [x, y]: [f64; 2], text: &str, font: Font, angle: f64) {
         let Font { size, anchor, bold, colour } = font;
         let weight = if bold { " font-weight=\"bold\"" } else { "" };
-        let turn = if angle == 0.0 { String::new() } else { format!(" transform=\"rotate({angle} {x:.1} {y:.1})\"") };
+        let turn = if angle == 0.0 {
+            String::new()
+        } else {
+            format!(" transform=\"rotate({angle} {x:.1} {y:.1})\"")
+        };
         let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
         let _ = writeln!(
             self.body,

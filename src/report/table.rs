@@ -1,7 +1,10 @@
 //! Aligned tables for the terminal.
 
 use crate::check::CheckReport;
+use crate::nlp::derivatives::DerivativeError;
+use crate::nlp::violation::BlockViolation;
 use crate::plan::CheckRow;
+use crate::warp::{Distribution, MapReport};
 
 /// A table with a header; columns of numbers are set flush right.
 pub struct Table {
@@ -40,11 +43,9 @@ impl Table {
         };
         let line = |cells: Vec<String>| cells.join("  ").trim_end().to_owned();
         let header = line(self.header.iter().enumerate().map(|(c, text)| pad(text, c)).collect());
-        let body = self
-            .rows
-            .iter()
-            .enumerate()
-            .map(|(r, row)| line(row.iter().enumerate().map(|(c, text)| paint(r, c, pad(text, c))).collect()));
+        let body = self.rows.iter().enumerate().map(|(r, row)| {
+            line(row.iter().enumerate().map(|(c, text)| paint(r, c, pad(text, c))).collect())
+        });
         std::iter::once(header).chain(body).collect()
     }
 }
@@ -64,14 +65,93 @@ pub fn check_table(report: &CheckReport, colour: bool) -> String {
         ]);
     }
     for row in &report.figures {
-        table.row([row.name.clone(), number(row.value), "–".into(), row.unit.clone(), String::new(), place(row)]);
+        table.row([
+            row.name.clone(),
+            number(row.value),
+            "–".into(),
+            row.unit.clone(),
+            String::new(),
+            place(row),
+        ]);
     }
-    let paint = |r: usize, c: usize, text: String| match (colour && c == 4, report.rows.get(r).map(|row| row.passed)) {
-        (true, Some(true)) => format!("\x1b[32m{text}\x1b[0m"),
-        (true, Some(false)) => format!("\x1b[1;31m{text}\x1b[0m"),
-        _ => text,
-    };
+    let paint =
+        |r: usize, c: usize, text: String| match (colour && c == 4, report.rows.get(r).map(|row| row.passed))
+        {
+            (true, Some(true)) => format!("\x1b[32m{text}\x1b[0m"),
+            (true, Some(false)) => format!("\x1b[1;31m{text}\x1b[0m"),
+            _ => text,
+        };
     table.lines(paint).join("\n")
+}
+
+/// The largest violation of every block of the NLP, in its units.
+pub fn violation_table(violations: &[BlockViolation], tolerance: f64) -> String {
+    let mut table = Table::new(&["constraint", ">rows", ">largest", "", "worst at"]);
+    for block in violations {
+        let [x, y] = block.place;
+        let place = match block.largest {
+            0.0 => String::new(),
+            _ => {
+                let foot = block.foot.as_ref().map_or(String::new(), |foot| format!(" {foot}"));
+                format!("{:.3} s{foot}, base at ({x:.2}, {y:.2}) m", block.time)
+            }
+        };
+        let verdict = if block.largest <= tolerance { "ok" } else { "violated" };
+        table.row([
+            block.block.clone(),
+            block.rows.to_string(),
+            number(block.largest),
+            verdict.into(),
+            place,
+        ]);
+    }
+    table.lines(|_, _, text| text).join("\n")
+}
+
+/// Analytic derivatives against differences, by block.
+pub fn derivative_table(errors: &[DerivativeError]) -> String {
+    let mut table = Table::new(&["derivatives of", ">largest error", ">missing", "at"]);
+    for error in errors {
+        table.row([
+            error.block.clone(),
+            number(error.largest),
+            error.missing.to_string(),
+            error.place.clone(),
+        ]);
+    }
+    table.lines(|_, _, text| text).join("\n")
+}
+
+/// What a map is like.
+pub fn map_table(report: &MapReport, cached: bool) -> String {
+    let [x, y, z] = report.cells;
+    let origin = if cached { "from the cache; built " } else { "" };
+    let ending = if report.converged { "converged" } else { "did NOT converge" };
+    let folded = match report.inverted_points {
+        0 => "nowhere folded".to_owned(),
+        n => format!("FOLDED at {n} points"),
+    };
+    let head = format!(
+        "Map of {x}×{y}×{z} cells, {origin}in {} s: {ending} after {} iterations, {folded}\n\
+         Distance from the terrain: {} mm rms, {} mm at most; least determinant {}; scale at the ground {} to {}\n",
+        number(report.seconds),
+        report.iterations,
+        number(1e3 * report.misfit_rms),
+        number(1e3 * report.misfit_max),
+        number(report.min_determinant),
+        number(report.scale[0]),
+        number(report.scale[1]),
+    );
+    let mut table = Table::new(&["", ">mean", ">median", ">95 %", ">most", "unit"]);
+    let mut row = |name: &str, d: &Distribution, factor: f64, unit: &str| {
+        let figures = [d.mean, d.median, d.p95, d.max].map(|v| number(factor * v));
+        table.row([name.to_owned()].into_iter().chain(figures).chain([unit.to_owned()]));
+    };
+    row("conformal error at the ground", &report.conformal_ground, 100.0, "%");
+    row("… up to 0.5 m above", &report.conformal_near_ground, 100.0, "%");
+    row("… at the torso, 0.4 to 0.6 m above", &report.conformal_torso, 100.0, "%");
+    row("J z to the terrain's normal", &report.normal_angle, 1.0, "°");
+    format!("{head}{}", table.lines(|_, _, text| text).join("\n"))
 }
 
 fn place(row: &CheckRow) -> String {

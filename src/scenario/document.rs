@@ -34,7 +34,8 @@ impl Document {
     pub fn read(path: &Path) -> Result<(Self, String)> {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-        let text = String::from_utf8(bytes).map_err(|_| Error::input(format!("{file}: not a text file in UTF-8")))?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| Error::input(format!("{file}: not a text file in UTF-8")))?;
         Ok((Self::parse(&file, &text)?, text))
     }
 
@@ -85,7 +86,8 @@ impl Document {
             };
         }
         table.insert((*last).to_owned(), value);
-        self.origins.retain(|known, _| !(known.starts_with(key) && known[key.len()..].starts_with(['.', '['])));
+        self.origins
+            .retain(|known, _| !(known.starts_with(key) && known[key.len()..].starts_with(['.', '['])));
         self.origins.insert(key.to_owned(), Origin::Override(assignment.to_owned()));
         Ok(())
     }

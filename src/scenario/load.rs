@@ -42,7 +42,8 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScenario> {
     }
     let scenario = checked(&document)?;
     if !overrides.is_empty() {
-        let body = toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?;
+        let body =
+            toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?;
         text = format!("# {} with --set {}\n{body}", path.display(), overrides.join(" --set "));
     }
     let base_dir = match path.parent() {

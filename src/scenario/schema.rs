@@ -58,7 +58,8 @@ impl<'a> Checker<'a> {
                 Some(property) => self.value(property, value, &at)?,
                 None => {
                     let allowed: Vec<&str> = properties.keys().map(String::as_str).collect();
-                    let guess = closest(key, &allowed).map_or(String::new(), |k| format!("did you mean `{k}`? "));
+                    let guess =
+                        closest(key, &allowed).map_or(String::new(), |k| format!("did you mean `{k}`? "));
                     let what = format!("unknown key; {guess}allowed here: {}", allowed.join(", "));
                     return Err(self.document.error(&at, what));
                 }
@@ -67,7 +68,9 @@ impl<'a> Checker<'a> {
         for required in schema["required"].as_array().into_iter().flatten().filter_map(Json::as_str) {
             if !table.contains_key(required) {
                 let allowed = self.describe(&properties[required]);
-                return Err(self.document.error(&join(path, required), format!("missing; it must be {allowed}")));
+                return Err(self
+                    .document
+                    .error(&join(path, required), format!("missing; it must be {allowed}")));
             }
         }
         Ok(())
@@ -86,7 +89,8 @@ impl<'a> Checker<'a> {
             if words.contains(&given) {
                 return Ok(());
             }
-            let guess = closest(given, &words).map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
+            let guess =
+                closest(given, &words).map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
             let what = format!("given {}, allowed: {}{guess}", show(value), self.describe(schema));
             return Err(self.document.error(path, what));
         }

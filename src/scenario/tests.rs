@@ -86,7 +86,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             vec!["s.toml:2: horizon: given \"long\" (a string)", "from 0.1 to 600"],
         ),
         (with("horizon = 10", "horizon = nan"), vec!["s.toml:2: horizon: given nan", "finite"]),
-        (with("position = [1.0, 1.0]", "position = [1.0, inf]"), vec!["s.toml:8: goal.position[1]: given inf"]),
+        (
+            with("position = [1.0, 1.0]", "position = [1.0, inf]"),
+            vec!["s.toml:8: goal.position[1]: given inf"],
+        ),
         (
             with("position = [1.0, 1.0]", "position = [1.0]"),
             vec!["s.toml:8: goal.position: given an array of 1: [1.0]", "an array of 2"],
@@ -99,7 +102,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             with("position = [1.0, 1.0]", "yaw = 0.0"),
             vec!["s.toml:7: goal.position: missing; it must be an array of 2"],
         ),
-        (with("kind = \"rippled\"", "level = \"easy\""), vec!["s.toml:3: terrain.kind: missing", "\"heightmap\""]),
+        (
+            with("kind = \"rippled\"", "level = \"easy\""),
+            vec!["s.toml:3: terrain.kind: missing", "\"heightmap\""],
+        ),
         (
             with("kind = \"rippled\"", "kind = \"ripled\""),
             vec!["s.toml:4: terrain.kind: given \"ripled\"", "did you mean \"rippled\"?"],
@@ -126,7 +132,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
         ),
         (
             with("horizon = 10", "horizon = 10\ntime_step = 0.001\n[solver]\ncontinuation = \"maybe\""),
-            vec!["s.toml:5: solver.continuation: given \"maybe\"", "\"auto\", \"off\", or an integer from 1 to 100"],
+            vec![
+                "s.toml:5: solver.continuation: given \"maybe\"",
+                "\"auto\", \"off\", or an integer from 1 to 100",
+            ],
         ),
         (with("horizon = 10", "horizon = 0.1"), vec!["time_step: given 0.05, which makes 2.0 steps"]),
         (with("horizon = 10", "horizon = = 10"), vec!["s.toml:2: not TOML", "horizon = = 10"]),
@@ -153,7 +162,8 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
 fn values_can_be_set_from_the_command_line() {
     let (_folder, path) = in_folder(GOOD);
     let set = |values: &[&str]| load(&path, &values.iter().map(|v| v.to_string()).collect::<Vec<_>>());
-    let loaded = set(&["gait.kind=pace", "map.cells = [8, 9, 10]", "solver.continuation=3", "goal.yaw=1e-1"]).unwrap();
+    let loaded =
+        set(&["gait.kind=pace", "map.cells = [8, 9, 10]", "solver.continuation=3", "goal.yaw=1e-1"]).unwrap();
     assert_eq!(loaded.scenario.gait.kind, GaitKind::Pace);
     assert_eq!(loaded.scenario.map.cells, [8, 9, 10]);
     assert_eq!(loaded.scenario.solver.continuation, Continuation::Steps(3));

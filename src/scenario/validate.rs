@@ -75,7 +75,9 @@ fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
 /// Refuses a start or goal outside the ground.
 pub(super) fn inside(document: &Document, scenario: &Scenario, extent: [f64; 4]) -> Result<()> {
     let [x_min, x_max, y_min, y_max] = extent;
-    for (key, [x, y]) in [("start.position", scenario.start.position), ("goal.position", scenario.goal.position)] {
+    for (key, [x, y]) in
+        [("start.position", scenario.start.position), ("goal.position", scenario.goal.position)]
+    {
         if !(x_min..=x_max).contains(&x) || !(y_min..=y_max).contains(&y) {
             let what = format!(
                 "given [{x}, {y}], outside the terrain; allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m"
@@ -107,7 +109,8 @@ fn gait(document: &Document, scenario: &Scenario) -> Result<()> {
     }
     match (&gait.phases, gait.kind) {
         (None, GaitKind::Custom) => {
-            let what = "missing; kind = \"custom\" needs a row of stance and swing durations by foot, stance first";
+            let what =
+                "missing; kind = \"custom\" needs a row of stance and swing durations by foot, stance first";
             Err(document.error("gait.phases", what))
         }
         (Some(_), kind) if kind != GaitKind::Custom => {
@@ -117,7 +120,8 @@ fn gait(document: &Document, scenario: &Scenario) -> Result<()> {
             for (foot, row) in rows.iter().enumerate() {
                 let sum: f64 = row.iter().sum();
                 if (sum - scenario.horizon).abs() > 1e-6 {
-                    let what = format!("the durations sum to {sum} s, expected the horizon, {} s", scenario.horizon);
+                    let what =
+                        format!("the durations sum to {sum} s, expected the horizon, {} s", scenario.horizon);
                     return Err(document.error(&format!("gait.phases[{foot}]"), what));
                 }
             }

@@ -77,7 +77,9 @@ pub fn standing() -> Plan {
                 inertia: [[0.946, 0.0, 0.0], [0.0, 1.945, 0.0], [0.0, 0.0, 2.018]],
                 friction: 0.75,
                 gravity: [0.0, 0.0, -GRAVITY],
-                reach: FEET.map(|[x, y]| Box3 { center: [x, y, -0.42], half_size: [0.15, 0.10, 0.10] }).to_vec(),
+                reach: FEET
+                    .map(|[x, y]| Box3 { center: [x, y, -0.42], half_size: [0.15, 0.10, 0.10] })
+                    .to_vec(),
                 torso: Box3 { center: [0.0; 3], half_size: [0.32, 0.14, 0.10] },
             },
             solver: MetaSolver {
