@@ -1,2 +1,5 @@
 //! The `warpgait` program.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    warpgait::cli::run()
+}

@@ -1,6 +1,11 @@
 //! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
 
+pub mod npz;
+mod read;
 pub mod sampled;
+mod write;
+
+pub use read::PLAN_SCHEMA;
 
 use serde::{Deserialize, Serialize};
 
@@ -181,12 +186,18 @@ pub struct Seconds {
 pub struct CheckRow {
     /// Which law.
     pub name: String,
-    /// What was found.
+    /// What was found, at its worst.
     pub value: f64,
     /// Its unit.
     pub unit: String,
-    /// What is allowed.
+    /// The largest value allowed.
     pub limit: f64,
-    /// Verdict.
+    /// Verdict: value ≤ limit.
     pub passed: bool,
+    /// When it was worst, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// The foot at which it was worst.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub foot: Option<String>,
 }

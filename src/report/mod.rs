@@ -1,1 +1,11 @@
-//! report (placeholder).
+//! What people read: tables for the terminal and drawings of a plan.
+
+mod axes;
+mod residuals;
+mod sheet;
+mod svg;
+pub mod table;
+
+pub use residuals::residuals;
+pub use sheet::sheet;
+pub use table::{check_table, derivative_table, map_table, number, violation_table};

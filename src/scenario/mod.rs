@@ -1,5 +1,18 @@
 //! The scenario: everything a user asks for, as plain data (`scenarios/*.toml`, schema 1).
 
+pub mod document;
+mod load;
+mod schema;
+mod template;
+#[cfg(test)]
+mod tests;
+mod validate;
+
+pub use load::{LoadedScenario, load, parse};
+pub(crate) use schema::closest as closest_word;
+pub use schema::json_schema;
+pub use template::template;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,16 +20,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Always 1.
+    /// Version of this format: 1.
+    #[serde(default = "default_schema")]
+    #[schemars(range(min = 1, max = 1))]
     pub schema: u32,
     /// Which space the variables live in.
     #[serde(default)]
     pub formulation: Formulation,
     /// T, s.
     #[serde(default = "default_horizon")]
+    #[schemars(range(min = 0.1, max = 600.0))]
     pub horizon: f64,
     /// Δt, s.
     #[serde(default = "default_time_step")]
+    #[schemars(range(min = 0.001, max = 1.0))]
     pub time_step: f64,
     /// Which robot.
     #[serde(default)]
@@ -47,6 +64,9 @@ pub struct Scenario {
     pub solver: SolverSpec,
 }
 
+fn default_schema() -> u32 {
+    1
+}
 fn default_horizon() -> f64 {
     10.0
 }
@@ -127,34 +147,47 @@ pub struct TerrainSpec {
     /// Parameters by name, for the four of the paper.
     pub level: Option<Level>,
     /// rippled: A, m.
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub amplitude: Option<f64>,
     /// rippled: 2π/k, m.
+    #[schemars(range(min = 0.05, max = 1000.0))]
     pub wavelength: Option<f64>,
     /// conic: s.
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub slope: Option<f64>,
     /// conic, pit: ρ0, m.
+    #[schemars(range(min = 0.01, max = 1000.0))]
     pub radius: Option<f64>,
     /// conic: ε, m.
+    #[schemars(range(min = 0.001, max = 100.0))]
     pub tip: Option<f64>,
     /// conic: β, m.
+    #[schemars(range(min = 0.001, max = 100.0))]
     pub foot: Option<f64>,
     /// hilly: H, m.
+    #[schemars(range(min = -100.0, max = 100.0))]
     pub height: Option<f64>,
     /// hilly: w, m.
+    #[schemars(range(min = 0.01, max = 1000.0))]
     pub width: Option<f64>,
     /// pit: D, m.
+    #[schemars(range(min = -100.0, max = 100.0))]
     pub depth: Option<f64>,
     /// pit: δ, m.
+    #[schemars(range(min = 0.001, max = 100.0))]
     pub edge: Option<f64>,
     /// formula: h(x, y) in m.
     pub expression: Option<String>,
     /// heightmap, mesh: file, relative to the scenario.
     pub file: Option<String>,
     /// heightmap: m a pixel; others: spacing of the grid that h is sampled on, m.
+    #[schemars(range(min = 0.001, max = 10.0))]
     pub spacing: Option<f64>,
     /// heightmap: m from black to white (image) or a factor (.npy).
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub height_scale: Option<f64>,
     /// heightmap, mesh: length over which h is smoothed, m.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub smoothing: Option<f64>,
     /// heightmap: x, y of the centre, m.
     pub origin: Option<[f64; 2]>,
@@ -208,14 +241,18 @@ pub struct GaitSpec {
     /// Which pattern.
     pub kind: GaitKind,
     /// Length of a cycle, s.
+    #[schemars(range(min = 0.1, max = 20.0))]
     pub cycle: f64,
     /// Share of the cycle that a foot stands; default by kind: walk 0.75, others 0.6.
+    #[schemars(range(min = 0.1, max = 1.0))]
     pub duty: Option<f64>,
     /// Make the phase durations variables.
     pub optimize_durations: bool,
     /// Least and greatest phase duration, s.
+    #[schemars(inner(range(min = 0.01, max = 100.0)))]
     pub duration_bounds: [f64; 2],
     /// custom: by foot, alternating stance and swing durations in s, stance first, their sum the horizon.
+    #[schemars(inner(inner(range(min = 0.01, max = 600.0))))]
     pub phases: Option<Vec<Vec<f64>>>,
 }
 
@@ -237,14 +274,19 @@ impl Default for GaitSpec {
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSpec {
     /// Least apex of a swing over the ground, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub swing_clearance: f64,
     /// Least distance of the torso's underside from the ground, m.
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub base_clearance: f64,
     /// Greatest normal force of a foot, of m g.
+    #[schemars(range(min = 0.1, max = 100.0))]
     pub force_limit: f64,
     /// Greatest pull of an adhesive foot, of m g.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub pull_limit: f64,
     /// Weights of base acceleration and force rate.
+    #[schemars(inner(range(min = 0.0, max = 1e6)))]
     pub smoothness: [f64; 2],
 }
 
@@ -276,10 +318,12 @@ pub enum Cone {
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
     /// ν.
+    #[schemars(range(min = 0.01, max = 10.0))]
     pub friction: f64,
     /// Which cone.
     pub cone: Cone,
     /// Greatest slope |∇h| of a foothold; default: none.
+    #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
 }
 
@@ -336,8 +380,10 @@ pub struct MapSpec {
     /// The method.
     pub method: MapMethod,
     /// Cells along x, y, z.
+    #[schemars(inner(range(min = 4, max = 512)))]
     pub cells: [usize; 3],
     /// Height of the box, m.
+    #[schemars(range(min = 0.1, max = 100.0))]
     pub thickness: f64,
 }
 
@@ -378,7 +424,7 @@ pub enum Continuation {
     /// `"auto"` or `"off"`.
     Mode(ContinuationMode),
     /// A number of steps.
-    Steps(u32),
+    Steps(#[schemars(range(min = 1, max = 100))] u32),
 }
 
 /// `"auto"` or `"off"`.
@@ -396,8 +442,10 @@ pub enum ContinuationMode {
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSpec {
     /// Iterations, those of a continuation included.
+    #[schemars(range(min = 1, max = 100000))]
     pub max_iterations: usize,
     /// Largest violation, in the units of the NLP.
+    #[schemars(range(min = 1e-12, max = 0.1))]
     pub tolerance: f64,
     /// Whether to grow the terrain out of the plane when the plain solve fails.
     pub continuation: Continuation,

@@ -1,0 +1,124 @@
+//! Feet and forces: on the ground in stance, over it in swing, forces within their cones and limits.
+
+use super::{Finding, Residuals, Subject, Worst, dot, laws, norm, scale, sub};
+
+pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    feet(s, findings, residuals);
+    swings(s, findings);
+    forces(s, findings, residuals);
+    footholds(s, findings);
+}
+
+/// Height of a foot over the ground, m.
+fn height_over_ground(s: &Subject, n: usize, e: usize) -> f64 {
+    let [x, y, z] = s.foot_position(n, e);
+    z - s.ground.height(x, y)
+}
+
+fn feet(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    let (mut gap, mut slip, mut penetration) = (Worst::default(), Worst::default(), Worst::default());
+    let mut landed = vec![None; s.feet];
+    residuals.stance_gap = vec![0.0; s.samples];
+    for (n, e) in s.sample_feet() {
+        let over = 1e3 * height_over_ground(s, n, e);
+        if s.in_contact(n, e) {
+            gap.meet(over.abs(), n, Some(e));
+            residuals.stance_gap[n] = residuals.stance_gap[n].max(over.abs());
+            let first = *landed[e].get_or_insert(s.foot_position(n, e));
+            slip.meet(1e3 * norm(sub(s.foot_position(n, e), first)), n, Some(e));
+        } else {
+            penetration.meet(-over, n, Some(e));
+            landed[e] = None;
+        }
+    }
+    findings.push((laws::STANCE_GAP, gap));
+    findings.push((laws::STANCE_SLIP, slip));
+    findings.push((laws::SWING_PENETRATION, penetration));
+}
+
+/// The apex of every swing that begins and ends within the plan.
+fn swings(s: &Subject, findings: &mut Vec<Finding>) {
+    let clearance = 1e3 * s.scenario.motion.swing_clearance;
+    let mut shortfall = Worst::default();
+    let mut least: Option<Worst> = None;
+    for e in 0..s.feet {
+        let mut n = 0;
+        while n < s.samples {
+            let begin = n;
+            while n < s.samples && !s.in_contact(n, e) {
+                n += 1;
+            }
+            if begin > 0 && n > begin && n < s.samples {
+                let heights = (begin..n).map(|k| (1e3 * height_over_ground(s, k, e), k));
+                let (apex, at) = heights
+                    .fold((f64::NEG_INFINITY, begin), |best, one| if one.0 > best.0 { one } else { best });
+                shortfall.meet(clearance - apex, at, Some(e));
+                if least.is_none_or(|known| apex < known.value) {
+                    least = Some(Worst { value: apex, sample: Some(at), foot: Some(e) });
+                }
+            }
+            n += 1;
+        }
+    }
+    findings.push((laws::SWING_APEX, shortfall));
+    findings.extend(least.map(|worst| (laws::LEAST_APEX, worst)));
+}
+
+/// The cone of Eq. 5 with the terrain's own normals, limits along the normal, nothing in swing.
+fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    let motion = &s.scenario.motion;
+    let share = 100.0 / s.weight;
+    let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
+        [Worst::default(); 6];
+    residuals.friction = vec![0.0; s.samples];
+    for (n, e) in s.sample_feet() {
+        let force = s.foot_force(n, e);
+        let [x, y, _] = s.foot_position(n, e);
+        let normal = s.ground.normal(x, y);
+        let stated = s.plan.foot_normal[n * s.feet + e];
+        // The chord between two unit vectors tells small angles better than the cosine.
+        normals.meet((2.0 * (0.5 * norm(sub(normal, stated))).min(1.0).asin()).to_degrees(), n, Some(e));
+        if !s.in_contact(n, e) {
+            swing.meet(share * norm(force), n, Some(e));
+            continue;
+        }
+        let along = dot(force, normal);
+        let across = norm(sub(force, scale(along, normal)));
+        push_over.meet(share * along - 100.0 * motion.force_limit, n, Some(e));
+        if s.plan.foot_adhesive[e] {
+            pull_over.meet(-share * along - 100.0 * motion.pull_limit, n, Some(e));
+        } else {
+            let excess = share * (across - s.plan.meta.robot.friction * along);
+            friction.meet(excess, n, Some(e));
+            residuals.friction[n] = residuals.friction[n].max(excess);
+            pull.meet(-share * along, n, Some(e));
+        }
+    }
+    findings.push((laws::NORMAL, normals));
+    findings.push((laws::FRICTION, friction));
+    findings.push((laws::PULL, pull));
+    findings.push((laws::FORCE_LIMIT, push_over));
+    findings.push((laws::PULL_LIMIT, pull_over));
+    findings.push((laws::SWING_FORCE, swing));
+}
+
+/// Where feet may stand: within the terrain, and not on slopes that the scenario rules out.
+fn footholds(s: &Subject, findings: &mut Vec<Finding>) {
+    let [x_min, x_max, y_min, y_max] = s.ground.extent();
+    let (mut outside, mut steep) = (Worst::default(), Worst::default());
+    for (n, e) in s.sample_feet().filter(|&(n, e)| s.in_contact(n, e)) {
+        let [x, y, _] = s.foot_position(n, e);
+        if !s.ground.covers(x, y) {
+            let beyond = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
+            outside.meet(1e3 * beyond(x, x_min, x_max).hypot(beyond(y, y_min, y_max)), n, Some(e));
+        }
+        if let Some(most) = s.scenario.contact.max_slope {
+            let normal = s.ground.normal(x, y);
+            steep.meet(normal[0].hypot(normal[1]) / normal[2] - most, n, Some(e));
+        }
+    }
+    findings.push((laws::INSIDE, outside));
+    if s.scenario.contact.max_slope.is_some() {
+        findings.push((laws::FOOTHOLD_SLOPE, steep));
+    }
+}

@@ -1,0 +1,113 @@
+//! The body: reach, clearance, start and goal, and whether anything jumps.
+
+use super::{Finding, Residuals, Subject, Worst, add, laws, norm, rms, rotate, rotate_back, scale, sub};
+
+pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    reach(s, findings, residuals);
+    base_clearance(s, findings, residuals);
+    ends(s, findings);
+    jumps(s, findings);
+    smoothness(s, findings);
+}
+
+/// Eq. 4: distance of Rᵀ(pᵢ − p) from the box 𝓡ᵢ.
+fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    let mut worst = Worst::default();
+    residuals.reach = vec![0.0; s.samples];
+    for (n, e) in s.sample_feet() {
+        let relative = sub(s.foot_position(n, e), s.plan.base_position[n]);
+        let body = rotate_back(s.plan.base_quaternion_wxyz[n], relative);
+        let limits = &s.plan.meta.robot.reach[e];
+        let beyond =
+            std::array::from_fn(|k| ((body[k] - limits.center[k]).abs() - limits.half_size[k]).max(0.0));
+        let distance = 1e3 * norm(beyond);
+        worst.meet(distance, n, Some(e));
+        residuals.reach[n] = residuals.reach[n].max(distance);
+    }
+    findings.push((laws::REACH, worst));
+}
+
+/// Distance of 5 × 3 points of the torso's underside from the ground below them.
+fn base_clearance(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+    let torso = &s.plan.meta.robot.torso;
+    let wanted = 1e3 * s.scenario.motion.base_clearance;
+    let mut shortfall = Worst::default();
+    let mut least = Worst { value: f64::INFINITY, ..Default::default() };
+    for n in 0..s.samples {
+        let mut here = f64::INFINITY;
+        for i in 0..5 {
+            for j in 0..3 {
+                let at = [f64::from(i) / 2.0 - 1.0, f64::from(j) - 1.0, -1.0];
+                let corner = std::array::from_fn(|k| torso.center[k] + at[k] * torso.half_size[k]);
+                let [x, y, z] = add(s.plan.base_position[n], rotate(s.plan.base_quaternion_wxyz[n], corner));
+                here = here.min(1e3 * (z - s.ground.height(x, y)));
+            }
+        }
+        residuals.clearance.push(here);
+        shortfall.meet(wanted - here, n, None);
+        if here < least.value {
+            least = Worst { value: here, sample: Some(n), foot: None };
+        }
+    }
+    findings.push((laws::BASE_CLEARANCE, shortfall));
+    findings.push((laws::LEAST_CLEARANCE, least));
+}
+
+fn ends(s: &Subject, findings: &mut Vec<Finding>) {
+    let last = s.samples - 1;
+    let distance = |n: usize, [x, y]: [f64; 2]| {
+        let p = s.plan.base_position[n];
+        let mut worst = Worst::default();
+        worst.meet(1e3 * (p[0] - x).hypot(p[1] - y), n, None);
+        worst
+    };
+    findings.push((laws::START, distance(0, s.scenario.start.position)));
+    findings.push((laws::GOAL, distance(last, s.scenario.goal.position)));
+    if let Some(yaw) = s.scenario.goal.yaw {
+        let [x, y, _] = rotate(s.plan.base_quaternion_wxyz[last], [1.0, 0.0, 0.0]);
+        let off = y.atan2(x) - yaw;
+        let mut worst = Worst::default();
+        worst.meet(off.sin().atan2(off.cos()).abs(), last, None);
+        findings.push((laws::GOAL_YAW, worst));
+    }
+}
+
+/// What a step adds to a position beyond its velocities, and what a step changes in a force beyond its neighbours.
+fn jumps(s: &Subject, findings: &mut Vec<Finding>) {
+    let plan = s.plan;
+    let (mut base, mut foot, mut force) = (Worst::default(), Worst::default(), Worst::default());
+    // Trapezoidal rule: for smooth motion the rest is of third order in the step.
+    let rest = |p: &[[f64; 3]], v: &[[f64; 3]], a: usize, b: usize| {
+        1e3 * norm(sub(sub(p[b], p[a]), scale(0.5 * s.step, add(v[a], v[b]))))
+    };
+    for n in 1..s.samples {
+        base.meet(rest(&plan.base_position, &plan.base_linear_velocity, n - 1, n), n, None);
+        for e in 0..s.feet {
+            let (a, b) = ((n - 1) * s.feet + e, n * s.feet + e);
+            foot.meet(rest(&plan.foot_position, &plan.foot_velocity, a, b), n, Some(e));
+            // A force may change quickly, but then it does so over several samples.
+            let change = |n: usize| norm(sub(s.foot_force(n, e), s.foot_force(n - 1, e)));
+            let before = if n > 1 { change(n - 1) } else { 0.0 };
+            let after = if n + 1 < s.samples { change(n + 1) } else { 0.0 };
+            force.meet(100.0 / s.weight * (change(n) - before.max(after)), n, Some(e));
+        }
+    }
+    findings.push((laws::BASE_JUMP, base));
+    findings.push((laws::FOOT_JUMP, foot));
+    findings.push((laws::FORCE_JUMP, force));
+}
+
+fn smoothness(s: &Subject, findings: &mut Vec<Finding>) {
+    let accelerations: Vec<f64> = s.plan.base_linear_acceleration.iter().map(|a| norm(*a)).collect();
+    findings.push((laws::BASE_ACCELERATION, Worst::overall(rms(&accelerations))));
+    let mut fastest = Worst::default();
+    for (n, omega) in s.plan.base_angular_velocity.iter().enumerate() {
+        fastest.meet(norm(*omega), n, None);
+    }
+    findings.push((laws::ANGULAR_SPEED, fastest));
+    let mut squares = Vec::new();
+    for (n, e) in s.sample_feet().filter(|&(n, _)| n > 0) {
+        squares.push(norm(sub(s.foot_force(n, e), s.foot_force(n - 1, e))) / (s.step * s.weight));
+    }
+    findings.push((laws::FORCE_RATE, Worst::overall(rms(&squares))));
+}

@@ -1,0 +1,112 @@
+//! `warpgait map`, and the map within `warpgait solve`.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::Ending;
+use super::console::Console;
+use super::progress::Progress;
+use crate::heightfield::Heightfield;
+use crate::ipopt::INTERRUPT;
+use crate::plan::npz::{NpzWriter, ensure_writable};
+use crate::report::map_table;
+use crate::scenario::{self, MapSpec};
+use crate::warp::{self, MapReport, WarpMap};
+use crate::{Error, Result, terrain};
+
+#[derive(Debug, Args)]
+pub(super) struct MapArguments {
+    /// The scenario whose map is built
+    scenario: PathBuf,
+    /// Write the map to this .npz file
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Set a value of the scenario; the key dotted, the value in TOML or a bare word
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Build the map anew, whatever the cache holds
+    #[arg(long)]
+    no_cache: bool,
+}
+
+pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending> {
+    if let Some(output) = &arguments.output {
+        ensure_writable(output)?;
+    }
+    let loaded = scenario::load(&arguments.scenario, &arguments.set)?;
+    super::listen_for_ctrl_c()?;
+    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir)?;
+    let mut progress = Progress::new(console.is_quiet());
+    ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
+    let Some(built) = build(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut progress)? else {
+        return Ok(Ending::Interrupted);
+    };
+    drop(progress);
+    let Built { map, report, cached } = &built;
+    if let Some(output) = &arguments.output {
+        write(output, map, &ground.field, report)?;
+    }
+    let sound = report.converged && report.inverted_points == 0;
+    console.result(&map_table(report, *cached));
+    if let Some(output) = &arguments.output {
+        console.result(&format!("Written: {}", output.display()));
+    }
+    console.object(&json!({
+        "scenario": arguments.scenario,
+        "map": arguments.output,
+        "sound": sound,
+        "cached": cached,
+        "terrain": ground.report,
+        "report": report,
+    }));
+    Ok(if sound { Ending::Good } else { Ending::NotGood })
+}
+
+/// A map and how it came about.
+pub(super) struct Built {
+    pub map: WarpMap,
+    pub report: MapReport,
+    pub cached: bool,
+}
+
+/// Builds the map, or takes it from the cache; none when Ctrl-C came.
+pub(super) fn build(
+    field: &Heightfield,
+    spec: &MapSpec,
+    with_cache: bool,
+    progress: &mut Progress,
+) -> Result<Option<Built>> {
+    let folder = if with_cache { warp::default_cache_dir() } else { None };
+    let found = warp::build_cached(field, spec, folder.as_deref(), &mut |at| {
+        let [x, y, z] = at.cells;
+        progress.update(
+            &format!("map {x}×{y}×{z}"),
+            &format!("iteration {}, decrement {:.1e} of {:.1e}", at.iteration, at.decrement, at.tolerance),
+        );
+        if INTERRUPT.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    match found {
+        Err(_) if INTERRUPT.is_raised() => Ok(None),
+        found => {
+            let (map, report, cached) = found?;
+            report.warnings.iter().for_each(|warning| progress.note(&format!("map: {warning}")));
+            Ok(Some(Built { map, report, cached }))
+        }
+    }
+}
+
+/// The map's members as in a plan, its ground, and the report as `meta`.
+fn write(path: &std::path::Path, map: &WarpMap, field: &Heightfield, report: &MapReport) -> Result<()> {
+    let (grid, samples) = (map.to_grid(), field.grid());
+    let mut npz = NpzWriter::create(path)?;
+    npz.add_map(&grid)?;
+    npz.add_f64("heightfield", &[samples.rows, samples.columns], field.samples().iter().copied())?;
+    npz.add_f64("heightfield_origin", &[2], samples.origin)?;
+    npz.add_f64("heightfield_spacing", &[2], samples.spacing)?;
+    let meta = serde_json::to_string(report).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    npz.add_str("meta", &[], &[meta])?;
+    npz.finish()
+}

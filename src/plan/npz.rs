@@ -1,0 +1,305 @@
+//! Archives of NumPy arrays (`.npz`): deflated zip files of `.npy` members that `numpy.load` reads.
+
+use std::fs::File;
+use std::io::{BufWriter, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use npyz::{DType, NpyFile, Order, WriterBuilder};
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use crate::{Error, Result};
+
+/// Writes an archive to a temporary file beside its target; [`NpzWriter::finish`] renames it, so that a killed process
+/// never leaves half a file under the target's name.
+pub struct NpzWriter {
+    zip: Option<ZipWriter<BufWriter<File>>>,
+    temporary: PathBuf,
+    target: PathBuf,
+}
+
+impl NpzWriter {
+    /// Opens the temporary file.
+    pub fn create(target: &Path) -> Result<Self> {
+        let temporary = temporary_beside(target)?;
+        let file = File::create(&temporary).map_err(|e| Error::io(target, e))?;
+        Ok(Self { zip: Some(ZipWriter::new(BufWriter::new(file))), temporary, target: target.to_path_buf() })
+    }
+
+    /// Adds a float64 array; `values` in C order, as many as the shape says.
+    pub fn add_f64(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item = f64>,
+    ) -> Result<()> {
+        self.add(name, shape, "<f8", |item: &mut dyn FnMut(&f64) -> std::io::Result<()>| {
+            values.into_iter().try_for_each(|v| item(&v))
+        })
+    }
+
+    /// Adds an array of points, shape `(…, K)`.
+    pub fn add_points<const K: usize>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: &[[f64; K]],
+    ) -> Result<()> {
+        let shape: Vec<usize> = shape.iter().copied().chain([K]).collect();
+        self.add_f64(name, &shape, values.iter().flatten().copied())
+    }
+
+    /// Adds an array of truth values.
+    pub fn add_bool(&mut self, name: &str, shape: &[usize], values: &[bool]) -> Result<()> {
+        self.add(name, shape, "|b1", |item: &mut dyn FnMut(&bool) -> std::io::Result<()>| {
+            values.iter().try_for_each(item)
+        })
+    }
+
+    /// Adds an array of strings (`<U…`); an empty shape is a single string.
+    pub fn add_str(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<()> {
+        // NumPy knows no strings of zero width.
+        let width = values.iter().map(|s| s.chars().count()).max().unwrap_or(0).max(1);
+        self.add(name, shape, &format!("<U{width}"), |item: &mut dyn FnMut(&str) -> std::io::Result<()>| {
+            values.iter().try_for_each(|s| item(s))
+        })
+    }
+
+    fn add<T: npyz::Serialize + ?Sized>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        dtype: &str,
+        push_all: impl FnOnce(&mut dyn FnMut(&T) -> std::io::Result<()>) -> std::io::Result<()>,
+    ) -> Result<()> {
+        let at = |e: std::io::Error| Error::io(&self.target, e);
+        let zip = self.zip.as_mut().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+        zip.start_file(format!("{name}.npy"), options).map_err(|e| at(e.into()))?;
+        let dtype = dtype.parse().map_err(|e| Error::Internal(format!("dtype {dtype}: {e}")))?;
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        let mut array = npyz::WriteOptions::<T>::new()
+            .dtype(DType::Plain(dtype))
+            .shape(&shape)
+            .writer(&mut *zip)
+            .begin_nd()
+            .map_err(at)?;
+        let expected: u64 = shape.iter().product();
+        let mut count = 0;
+        push_all(&mut |value| {
+            count += 1;
+            array.push(value)
+        })
+        .map_err(at)?;
+        if count != expected {
+            return Err(Error::Internal(format!("{name}: {count} values for the shape {shape:?}")));
+        }
+        array.finish().map_err(at)
+    }
+
+    /// Closes the archive and gives it its name.
+    pub fn finish(mut self) -> Result<()> {
+        let at = |e: std::io::Error| Error::io(&self.target, e);
+        let zip = self.zip.take().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
+        let buffer = zip.finish().map_err(|e| at(e.into()))?;
+        let file = buffer.into_inner().map_err(|e| at(e.into_error()))?;
+        file.sync_all().map_err(at)?;
+        drop(file);
+        std::fs::rename(&self.temporary, &self.target).map_err(at)
+    }
+}
+
+impl Drop for NpzWriter {
+    fn drop(&mut self) {
+        // After `finish` there is no such file any more; before it, a failed write must not leave one.
+        drop(self.zip.take());
+        let _ = std::fs::remove_file(&self.temporary);
+    }
+}
+
+/// Writes a whole file by way of a temporary one beside it.
+pub fn write_atomically(target: &Path, content: &[u8]) -> Result<()> {
+    let temporary = temporary_beside(target)?;
+    let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, target));
+    written.map_err(|e| {
+        let _ = std::fs::remove_file(&temporary);
+        Error::io(target, e)
+    })
+}
+
+/// Makes sure that a file can be written at `target`, without touching what is there.
+pub fn ensure_writable(target: &Path) -> Result<()> {
+    let temporary = temporary_beside(target)?;
+    File::create(&temporary)
+        .and_then(|_| std::fs::remove_file(&temporary))
+        .map_err(|e| Error::input(format!("{}: cannot be written: {e}", target.display())))
+}
+
+/// A name in the same folder, so that renaming does not copy; refuses targets that cannot be files.
+fn temporary_beside(target: &Path) -> Result<PathBuf> {
+    let refuse = |why: &str| Err(Error::input(format!("{}: cannot be written: {why}", target.display())));
+    let Some(name) = target.file_name() else { return refuse("this is not the name of a file") };
+    if target.is_dir() {
+        return refuse("this is a folder; name a file in it");
+    }
+    let folder = match target.parent() {
+        Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
+        Some(parent) => parent,
+        None => return refuse("this is not the name of a file"),
+    };
+    if !folder.is_dir() {
+        return refuse(&format!("there is no folder {}; create it first", folder.display()));
+    }
+    let mut hidden = std::ffi::OsString::from(".");
+    hidden.push(name);
+    hidden.push(format!(".{}.part", std::process::id()));
+    Ok(folder.join(hidden))
+}
+
+/// Reads the members of an archive; every error names the file and the member.
+pub struct NpzReader {
+    zip: ZipArchive<Cursor<Vec<u8>>>,
+    file: String,
+}
+
+impl NpzReader {
+    /// Reads the file into memory and finds its members.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = path.display().to_string();
+        let content = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+        let zip = ZipArchive::new(Cursor::new(content))
+            .map_err(|e| Error::input(format!("{file}: not an .npz archive, or cut short: {e}")))?;
+        Ok(Self { zip, file })
+    }
+
+    /// Whether there is such a member.
+    pub fn has(&self, name: &str) -> bool {
+        self.zip.index_for_name(&format!("{name}.npy")).is_some()
+    }
+
+    /// All members, sorted by name.
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            self.zip.file_names().filter_map(|n| n.strip_suffix(".npy")).map(str::to_owned).collect();
+        names.sort();
+        names
+    }
+
+    /// An input error at a member.
+    pub fn error(&self, member: &str, what: impl std::fmt::Display) -> Error {
+        Error::input(format!("{}: member `{member}`: {what}", self.file))
+    }
+
+    /// A float64 array with its shape; NaN and infinities are let through.
+    pub fn any_f64(&mut self, name: &str) -> Result<(Vec<usize>, Vec<f64>)> {
+        self.read(name, "float64 (<f8)", |dtype| dtype == "<f8")
+    }
+
+    /// A float64 array of finite values with its shape.
+    pub fn finite_f64(&mut self, name: &str) -> Result<(Vec<usize>, Vec<f64>)> {
+        let (shape, values) = self.any_f64(name)?;
+        match values.iter().position(|v| !v.is_finite()) {
+            None => Ok((shape, values)),
+            Some(at) => Err(self.error(name, format!("{} at {}", values[at], index_in(&shape, at)))),
+        }
+    }
+
+    /// A float64 array of finite values of a known shape.
+    pub fn f64(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
+        let (found, values) = self.finite_f64(name)?;
+        self.expect_shape(name, &found, shape)?;
+        Ok(values)
+    }
+
+    /// An array of points of a known shape `(…, K)`.
+    pub fn points<const K: usize>(&mut self, name: &str, shape: &[usize]) -> Result<Vec<[f64; K]>> {
+        let shape: Vec<usize> = shape.iter().copied().chain([K]).collect();
+        let values = self.f64(name, &shape)?;
+        Ok(values.as_chunks::<K>().0.to_vec())
+    }
+
+    /// An array of truth values of a known shape.
+    pub fn bool(&mut self, name: &str, shape: &[usize]) -> Result<Vec<bool>> {
+        let (found, values) = self.read(name, "bool (|b1)", |dtype| dtype == "|b1")?;
+        self.expect_shape(name, &found, shape)?;
+        Ok(values)
+    }
+
+    /// An array of strings with its shape.
+    pub fn str(&mut self, name: &str) -> Result<(Vec<usize>, Vec<String>)> {
+        self.read(name, "str (<U…)", |dtype| dtype.starts_with("<U"))
+    }
+
+    fn expect_shape(&self, name: &str, found: &[usize], expected: &[usize]) -> Result<()> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(self.error(name, format!("shape {}, expected {}", tuple(found), tuple(expected))))
+    }
+
+    fn read<T: npyz::Deserialize>(
+        &mut self,
+        name: &str,
+        wanted: &str,
+        accept: impl Fn(&str) -> bool,
+    ) -> Result<(Vec<usize>, Vec<T>)> {
+        let member = self.zip.by_name(&format!("{name}.npy")).and_then(|mut member| {
+            let mut content = Vec::new();
+            member.read_to_end(&mut content)?;
+            Ok(content)
+        });
+        let content = match member {
+            Ok(content) => content,
+            Err(ZipError::FileNotFound) => return Err(self.error(name, "missing")),
+            Err(e) => return Err(self.error(name, format!("damaged or cut short: {e}"))),
+        };
+        let mut rest = Cursor::new(&content[..]);
+        let header = npyz::NpyHeader::from_reader(&mut rest)
+            .map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
+        let dtype = match header.dtype() {
+            DType::Plain(plain) => plain.to_string(),
+            other => other.descr(),
+        };
+        if !accept(&dtype) {
+            return Err(self.error(name, format!("dtype {dtype}, expected {wanted}")));
+        }
+        let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
+        if header.order() != Order::C && shape.len() > 1 {
+            return Err(self.error(name, "stored in Fortran order, expected C order"));
+        }
+        // The size must fit before anything is allocated for it.
+        let width = item_size(&dtype);
+        let bytes = shape.iter().try_fold(width, |product, &n| product.checked_mul(n));
+        let available = content.len() - rest.position() as usize;
+        if bytes != Some(available) {
+            return Err(self
+                .error(name, format!("{available} bytes of data do not make {} of {dtype}", tuple(&shape))));
+        }
+        let values = NpyFile::with_header(header, rest).into_vec::<T>().map_err(|e| self.error(name, e))?;
+        Ok((shape, values))
+    }
+}
+
+/// Bytes of one element of a dtype such as `<f8`, `|b1` or `<U12`.
+fn item_size(dtype: &str) -> usize {
+    let digits: usize = dtype.get(2..).and_then(|n| n.parse().ok()).unwrap_or(0);
+    if dtype.contains('U') { digits.saturating_mul(4) } else { digits }
+}
+
+fn tuple(shape: &[usize]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// The index of a flat position, as NumPy writes it.
+fn index_in(shape: &[usize], mut flat: usize) -> String {
+    let mut index = vec![0; shape.len()];
+    for (slot, &n) in index.iter_mut().zip(shape).rev() {
+        *slot = flat % n.max(1);
+        flat /= n.max(1);
+    }
+    format!("[{}]", index.iter().map(usize::to_string).collect::<Vec<_>>().join(", "))
+}

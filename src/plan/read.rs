@@ -1,0 +1,192 @@
+//! Reading a plan.
+
+use std::path::Path;
+
+use super::npz::NpzReader;
+use super::{GroundGrid, MapGrid, Meta, Plan, WarpedSamples};
+use crate::Result;
+
+/// The newest plan that this reader knows.
+pub const PLAN_SCHEMA: u32 = 1;
+
+impl Plan {
+    /// Reads `NAME.plan.npz`. Refuses, with the file's and the member's name and what is wrong: a missing member, a
+    /// wrong shape or dtype, a value that is not finite, a newer schema, a file cut short.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut npz = NpzReader::open(path)?;
+        // First, so that a plan of a newer schema is refused as such and not for what that schema changed.
+        let meta = read_meta(&mut npz)?;
+
+        let (shape, t) = npz.finite_f64("t")?;
+        let n = t.len();
+        if shape.len() != 1 || n < 2 {
+            return Err(npz.error("t", format!("shape {shape:?}, expected (N,) with N of at least 2")));
+        }
+        let (shape, foot_names) = npz.str("foot_names")?;
+        let e = foot_names.len();
+        if shape.len() != 1 || e == 0 {
+            return Err(
+                npz.error("foot_names", format!("shape {shape:?}, expected (E,) with at least one foot"))
+            );
+        }
+        if meta.robot.reach.len() != e {
+            let reach = meta.robot.reach.len();
+            return Err(
+                npz.error("meta", format!("robot.reach has {reach} boxes for the {e} feet of foot_names"))
+            );
+        }
+
+        let warped = if npz.has("warped_base_position") {
+            Some(WarpedSamples {
+                base_position: npz.points("warped_base_position", &[n])?,
+                base_euler: npz.points("warped_base_euler", &[n])?,
+                foot_position: npz.points("warped_foot_position", &[n, e])?,
+                foot_force: npz.points("warped_foot_force", &[n, e])?,
+            })
+        } else {
+            None
+        };
+
+        let (shape, history_objective) = npz.finite_f64("history_objective")?;
+        let iterations = history_objective.len();
+        if shape.len() != 1 {
+            return Err(npz.error("history_objective", format!("shape {shape:?}, expected (iterations,)")));
+        }
+
+        Ok(Self {
+            base_position: npz.points("base_position", &[n])?,
+            base_quaternion_wxyz: npz.points("base_quaternion_wxyz", &[n])?,
+            base_linear_velocity: npz.points("base_linear_velocity", &[n])?,
+            base_linear_acceleration: npz.points("base_linear_acceleration", &[n])?,
+            base_angular_velocity: npz.points("base_angular_velocity", &[n])?,
+            base_angular_acceleration: npz.points("base_angular_acceleration", &[n])?,
+            foot_position: npz.points("foot_position", &[n, e])?,
+            foot_velocity: npz.points("foot_velocity", &[n, e])?,
+            foot_acceleration: npz.points("foot_acceleration", &[n, e])?,
+            foot_force: npz.points("foot_force", &[n, e])?,
+            foot_contact: npz.bool("foot_contact", &[n, e])?,
+            foot_normal: npz.points("foot_normal", &[n, e])?,
+            foot_adhesive: npz.bool("foot_adhesive", &[e])?,
+            warped,
+            phase_durations: read_phases(&mut npz, e)?,
+            splines: read_splines(&mut npz)?,
+            ground: read_ground(&mut npz)?,
+            map: if npz.has("map_control_points") { Some(read_map(&mut npz)?) } else { None },
+            history_objective,
+            history_constraint_violation: npz.f64("history_constraint_violation", &[iterations])?,
+            history_seconds: npz.f64("history_seconds", &[iterations])?,
+            t,
+            foot_names,
+            meta,
+        })
+    }
+}
+
+fn read_meta(npz: &mut NpzReader) -> Result<Meta> {
+    let (shape, text) = npz.str("meta")?;
+    if !shape.is_empty() {
+        return Err(npz.error("meta", format!("shape {shape:?}, expected () (one string)")));
+    }
+    let value: serde_json::Value =
+        serde_json::from_str(&text[0]).map_err(|e| npz.error("meta", format!("not a JSON object: {e}")))?;
+    match value.get("schema").and_then(serde_json::Value::as_u64) {
+        Some(schema) if schema == u64::from(PLAN_SCHEMA) => {}
+        Some(schema) if schema > u64::from(PLAN_SCHEMA) => {
+            let what = format!(
+                "schema {schema} is newer than {PLAN_SCHEMA}, the newest known here; update warpgait"
+            );
+            return Err(npz.error("meta", what));
+        }
+        _ => {
+            let given = value.get("schema").map_or("nothing".into(), |v| v.to_string());
+            return Err(npz.error("meta", format!("schema is {given}, expected {PLAN_SCHEMA}")));
+        }
+    }
+    serde_json::from_value(value).map_err(|e| npz.error("meta", e))
+}
+
+/// (E, P), padded with NaN at the end of each row.
+fn read_phases(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<f64>>> {
+    let name = "phase_durations";
+    let (shape, values) = npz.any_f64(name)?;
+    let &[rows, columns] = &shape[..] else {
+        return Err(npz.error(name, format!("shape {shape:?}, expected ({feet}, P)")));
+    };
+    if rows != feet {
+        return Err(npz.error(name, format!("shape ({rows}, {columns}), expected ({feet}, P)")));
+    }
+    let mut phases = Vec::with_capacity(rows);
+    for foot in 0..rows {
+        let row = &values[foot * columns..(foot + 1) * columns];
+        let used = row.iter().position(|v| v.is_nan()).unwrap_or(columns);
+        if row[used..].iter().any(|v| !v.is_nan()) {
+            return Err(npz.error(name, format!("NaN at [{foot}, {used}] before the end of the row")));
+        }
+        if let Some(at) = row[..used].iter().position(|v| !v.is_finite() || *v < 0.0) {
+            return Err(npz.error(name, format!("{} at [{foot}, {at}], expected a duration in s", row[at])));
+        }
+        phases.push(row[..used].to_vec());
+    }
+    Ok(phases)
+}
+
+fn read_splines(npz: &mut NpzReader) -> Result<Vec<(String, Vec<usize>, Vec<f64>)>> {
+    let members: Vec<String> = npz.names().into_iter().filter(|name| name.starts_with("spline/")).collect();
+    members
+        .into_iter()
+        .map(|member| {
+            let (shape, values) = npz.finite_f64(&member)?;
+            Ok((member["spline/".len()..].to_owned(), shape, values))
+        })
+        .collect()
+}
+
+fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
+    let (shape, height) = npz.finite_f64("heightfield")?;
+    let &[rows, columns] = &shape[..] else {
+        return Err(npz.error("heightfield", format!("shape {shape:?}, expected (rows, columns)")));
+    };
+    if rows < 2 || columns < 2 {
+        return Err(npz.error("heightfield", format!("shape ({rows}, {columns}), expected at least (2, 2)")));
+    }
+    let origin = npz.f64("heightfield_origin", &[2])?;
+    let spacing = npz.f64("heightfield_spacing", &[2])?;
+    if spacing.iter().any(|&s| s <= 0.0) {
+        return Err(npz.error("heightfield_spacing", format!("{spacing:?}, expected lengths above 0 m")));
+    }
+    let raw =
+        if npz.has("heightfield_raw") { Some(npz.f64("heightfield_raw", &[rows, columns])?) } else { None };
+    Ok(GroundGrid {
+        rows,
+        columns,
+        origin: [origin[0], origin[1]],
+        spacing: [spacing[0], spacing[1]],
+        height,
+        raw,
+    })
+}
+
+fn read_map(npz: &mut NpzReader) -> Result<MapGrid> {
+    let (shape, values) = npz.finite_f64("map_control_points")?;
+    let &[nx, ny, nz, 3] = &shape[..] else {
+        return Err(
+            npz.error("map_control_points", format!("shape {shape:?}, expected (Nx+3, Ny+3, Nz+3, 3)"))
+        );
+    };
+    let origin = npz.f64("map_origin", &[3])?;
+    let mut knots: [Vec<f64>; 3] = Default::default();
+    for (axis, knots) in ["x", "y", "z"].iter().zip(&mut knots) {
+        let name = format!("map_knots_{axis}");
+        let (shape, values) = npz.finite_f64(&name)?;
+        if shape.len() != 1 || values.windows(2).any(|pair| pair[1] < pair[0]) {
+            return Err(npz.error(&name, "expected one row of knots that never decrease"));
+        }
+        *knots = values;
+    }
+    Ok(MapGrid {
+        shape: [nx, ny, nz],
+        control_points: values.as_chunks::<3>().0.to_vec(),
+        origin: [origin[0], origin[1], origin[2]],
+        knots,
+    })
+}

@@ -1,0 +1,184 @@
+//! Writing a plan.
+
+use std::path::Path;
+
+use super::npz::NpzWriter;
+use super::{MapGrid, Plan};
+use crate::{Error, Result};
+
+impl Plan {
+    /// Writes `NAME.plan.npz`: to a temporary file beside the target, which is then renamed.
+    ///
+    /// Fails when the file cannot be written, and when the plan itself is unsound: an array of the wrong length or a
+    /// value that is not finite, which [`Plan::read`] would refuse.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        self.ensure_sound()?;
+        let (n, e) = (self.t.len(), self.foot_names.len());
+        let mut npz = NpzWriter::create(path)?;
+
+        npz.add_f64("t", &[n], self.t.iter().copied())?;
+        npz.add_points("base_quaternion_wxyz", &[n], &self.base_quaternion_wxyz)?;
+        for (name, values) in self.base_members() {
+            npz.add_points(name, &[n], values)?;
+        }
+        for (name, values) in self.foot_members() {
+            npz.add_points(name, &[n, e], values)?;
+        }
+        npz.add_bool("foot_contact", &[n, e], &self.foot_contact)?;
+        npz.add_str("foot_names", &[e], &self.foot_names)?;
+        npz.add_bool("foot_adhesive", &[e], &self.foot_adhesive)?;
+
+        if let Some(warped) = &self.warped {
+            npz.add_points("warped_base_position", &[n], &warped.base_position)?;
+            npz.add_points("warped_base_euler", &[n], &warped.base_euler)?;
+            npz.add_points("warped_foot_position", &[n, e], &warped.foot_position)?;
+            npz.add_points("warped_foot_force", &[n, e], &warped.foot_force)?;
+        }
+
+        let phases = self.phase_durations.iter().map(Vec::len).max().unwrap_or(0);
+        let padded = self.phase_durations.iter().flat_map(|durations| {
+            durations.iter().copied().chain(std::iter::repeat_n(f64::NAN, phases - durations.len()))
+        });
+        npz.add_f64("phase_durations", &[e, phases], padded)?;
+        for (name, shape, values) in &self.splines {
+            npz.add_f64(&format!("spline/{name}"), shape, values.iter().copied())?;
+        }
+
+        let ground = &self.ground;
+        let shape = [ground.rows, ground.columns];
+        npz.add_f64("heightfield", &shape, ground.height.iter().copied())?;
+        npz.add_f64("heightfield_origin", &[2], ground.origin)?;
+        npz.add_f64("heightfield_spacing", &[2], ground.spacing)?;
+        if let Some(raw) = &ground.raw {
+            npz.add_f64("heightfield_raw", &shape, raw.iter().copied())?;
+        }
+        if let Some(map) = &self.map {
+            npz.add_map(map)?;
+        }
+
+        for (name, values) in self.history_members() {
+            npz.add_f64(name, &[values.len()], values.iter().copied())?;
+        }
+        let meta = serde_json::to_string(&self.meta).map_err(|e| Error::Internal(format!("meta: {e}")))?;
+        npz.add_str("meta", &[], &[meta])?;
+        npz.finish()
+    }
+
+    /// The arrays of shape (N, 3), by member name.
+    fn base_members(&self) -> [(&'static str, &Vec<[f64; 3]>); 5] {
+        [
+            ("base_position", &self.base_position),
+            ("base_linear_velocity", &self.base_linear_velocity),
+            ("base_linear_acceleration", &self.base_linear_acceleration),
+            ("base_angular_velocity", &self.base_angular_velocity),
+            ("base_angular_acceleration", &self.base_angular_acceleration),
+        ]
+    }
+
+    /// The arrays of shape (N, E, 3), by member name.
+    fn foot_members(&self) -> [(&'static str, &Vec<[f64; 3]>); 5] {
+        [
+            ("foot_position", &self.foot_position),
+            ("foot_velocity", &self.foot_velocity),
+            ("foot_acceleration", &self.foot_acceleration),
+            ("foot_force", &self.foot_force),
+            ("foot_normal", &self.foot_normal),
+        ]
+    }
+
+    /// The solver's history, by member name.
+    fn history_members(&self) -> [(&'static str, &Vec<f64>); 3] {
+        [
+            ("history_objective", &self.history_objective),
+            ("history_constraint_violation", &self.history_constraint_violation),
+            ("history_seconds", &self.history_seconds),
+        ]
+    }
+
+    /// Whether every array has its length and every value is finite: what the reader would refuse is an error of the
+    /// program, and better met before the file is there.
+    pub(crate) fn ensure_sound(&self) -> Result<()> {
+        let (n, e) = (self.t.len(), self.foot_names.len());
+        let base = self.base_members().map(|(name, values)| (name, n, values));
+        let feet = self.foot_members().map(|(name, values)| (name, n * e, values));
+        for (name, length, values) in base.into_iter().chain(feet) {
+            ensure(name, values.len() == length, values.iter().flatten())?;
+        }
+        ensure("t", n >= 2, &self.t)?;
+        ensure(
+            "base_quaternion_wxyz",
+            self.base_quaternion_wxyz.len() == n,
+            self.base_quaternion_wxyz.iter().flatten(),
+        )?;
+        ensure("foot_contact", self.foot_contact.len() == n * e, [])?;
+        ensure("foot_adhesive", self.foot_adhesive.len() == e, [])?;
+        ensure("phase_durations", self.phase_durations.len() == e, self.phase_durations.iter().flatten())?;
+        if let Some(warped) = &self.warped {
+            ensure(
+                "warped_base_position",
+                warped.base_position.len() == n,
+                warped.base_position.iter().flatten(),
+            )?;
+            ensure("warped_base_euler", warped.base_euler.len() == n, warped.base_euler.iter().flatten())?;
+            ensure(
+                "warped_foot_position",
+                warped.foot_position.len() == n * e,
+                warped.foot_position.iter().flatten(),
+            )?;
+            ensure(
+                "warped_foot_force",
+                warped.foot_force.len() == n * e,
+                warped.foot_force.iter().flatten(),
+            )?;
+        }
+        for (name, shape, values) in &self.splines {
+            ensure(name, shape.iter().product::<usize>() == values.len(), values)?;
+        }
+        let ground = &self.ground;
+        let cells = ground.rows * ground.columns;
+        ensure(
+            "heightfield",
+            ground.height.len() == cells,
+            ground.height.iter().chain(&ground.origin).chain(&ground.spacing),
+        )?;
+        if let Some(raw) = &ground.raw {
+            ensure("heightfield_raw", raw.len() == cells, raw)?;
+        }
+        if let Some(map) = &self.map {
+            let points = &map.control_points;
+            ensure(
+                "map_control_points",
+                points.len() == map.shape.iter().product::<usize>(),
+                points.iter().flatten(),
+            )?;
+            ensure("map_knots", true, map.knots.iter().flatten().chain(&map.origin))?;
+        }
+        let iterations = self.history_objective.len();
+        for (name, values) in self.history_members() {
+            ensure(name, values.len() == iterations, values)?;
+        }
+        Ok(())
+    }
+}
+
+fn ensure<'a>(name: &str, right_length: bool, values: impl IntoIterator<Item = &'a f64>) -> Result<()> {
+    if !right_length {
+        return Err(Error::Internal(format!("the plan's {name} has the wrong length")));
+    }
+    if values.into_iter().any(|v| !v.is_finite()) {
+        return Err(Error::Internal(format!("the plan's {name} has a value that is not finite")));
+    }
+    Ok(())
+}
+
+impl NpzWriter {
+    /// Adds the members of a warp map.
+    pub fn add_map(&mut self, map: &MapGrid) -> Result<()> {
+        self.add_points("map_control_points", &map.shape, &map.control_points)?;
+        self.add_f64("map_origin", &[3], map.origin)?;
+        for (axis, knots) in ["x", "y", "z"].iter().zip(&map.knots) {
+            self.add_f64(&format!("map_knots_{axis}"), &[knots.len()], knots.iter().copied())?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! One sheet that shows a plan: from above, from the side, contacts, forces, convergence.
+
+use super::axes::{Axes, range};
+use super::svg::{Font, Svg, foot_colour};
+use super::table::number;
+use crate::plan::{GroundGrid, Plan};
+
+/// Levels of the shading.
+const LEVELS: usize = 14;
+/// Rows and columns of the shading.
+const RASTER: usize = 150;
+const BASE: &str = "stroke=\"#111\" stroke-width=\"2.4\"";
+
+/// An SVG drawing of a plan.
+pub fn sheet(plan: &Plan) -> String {
+    let mut svg = Svg::new(1280.0, 1010.0);
+    heading(&mut svg, plan);
+    from_above(&mut svg, plan, [70.0, 110.0, 540.0, 480.0]);
+    from_the_side(&mut svg, plan, [700.0, 110.0, 550.0, 260.0]);
+    contacts(&mut svg, plan, [700.0, 450.0, 550.0, 140.0]);
+    normal_forces(&mut svg, plan, [70.0, 680.0, 720.0, 270.0]);
+    convergence(&mut svg, plan, [880.0, 680.0, 370.0, 270.0]);
+    svg.finish()
+}
+
+fn heading(svg: &mut Svg, plan: &Plan) {
+    let meta = &plan.meta;
+    let [first, last] = [plan.t[0], plan.t[plan.t.len() - 1]];
+    let title = format!("{}, {} formulation, {} s", meta.robot.name, meta.formulation, number(last - first));
+    svg.text([70.0, 32.0], &title, Font { size: 19.0, ..Font::TITLE });
+    let failed: Vec<&str> =
+        meta.checks.iter().filter(|row| !row.passed).map(|row| row.name.as_str()).collect();
+    let checks = match (meta.checks.len(), failed.len()) {
+        (0, _) => "not checked".to_owned(),
+        (n, 0) => format!("all {n} checks hold"),
+        (n, 1..=3) => format!("{} of {n} checks fail: {}", failed.len(), failed.join(", ")),
+        (n, _) => format!("{} of {n} checks fail: {}, …", failed.len(), failed[..3].join(", ")),
+    };
+    let solver = &meta.solver;
+    let words = format!(
+        "{}; {} iterations, {} s, largest violation {}; {checks}",
+        solver.status,
+        solver.iterations,
+        number(solver.seconds.total),
+        number(solver.max_violation)
+    );
+    let colour = if solver.success && failed.is_empty() { "#1b6e44" } else { "#b3261e" };
+    svg.text([70.0, 56.0], &words, Font { size: 13.5, anchor: "start", bold: false, colour });
+    // One legend for all panels.
+    let mut x = 700.0;
+    svg.line([x, 76.0], [x + 24.0, 76.0], BASE);
+    svg.text([x + 30.0, 80.0], "base", Font::TICK.anchored("start"));
+    for (e, name) in plan.foot_names.iter().enumerate() {
+        x += 82.0;
+        svg.line([x, 76.0], [x + 24.0, 76.0], &stroke(e, 2.4));
+        svg.text([x + 30.0, 80.0], name, Font::TICK.anchored("start"));
+    }
+}
+
+fn stroke(foot: usize, width: f64) -> String {
+    format!("stroke=\"{}\" stroke-width=\"{width}\"", foot_colour(foot))
+}
+
+fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+    let visited = |axis: usize| plan.base_position.iter().chain(&plan.foot_position).map(move |p| p[axis]);
+    let axes = Axes::equal(frame, range(visited(0), 0.12), range(visited(1), 0.12));
+    svg.clipped(frame, |svg| {
+        svg.rect(frame, "fill=\"#f4f4f4\"");
+        shading(svg, &axes, &plan.ground);
+    });
+    axes.draw(svg, "From above, ground shaded by height", "x, m", "y, m");
+    svg.clipped(frame, |svg| {
+        for e in 0..plan.foot_names.len() {
+            let path = foot_samples(plan, e).map(|(_, p)| axes.at(p[0], p[1]));
+            svg.polyline(path, &format!("{} stroke-opacity=\"0.75\"", stroke(e, 1.1)));
+        }
+        for e in 0..plan.foot_names.len() {
+            for (_, [x, y, _]) in footholds(plan, e) {
+                let style = format!("fill=\"{}\" stroke=\"#fff\" stroke-width=\"0.8\"", foot_colour(e));
+                svg.circle(axes.at(x, y), 4.0, &style);
+            }
+        }
+        svg.polyline(plan.base_position.iter().map(|p| axes.at(p[0], p[1])), BASE);
+        let [start, end] =
+            [plan.base_position[0], plan.base_position[plan.t.len() - 1]].map(|p| axes.at(p[0], p[1]));
+        svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
+        svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
+    });
+    height_scale(svg, plan, &axes);
+}
+
+/// Samples of one foot: index and position.
+fn foot_samples(plan: &Plan, foot: usize) -> impl Iterator<Item = (usize, [f64; 3])> {
+    plan.foot_position.iter().skip(foot).step_by(plan.foot_names.len()).copied().enumerate()
+}
+
+/// The sample and place of every touch-down of a foot, the first stance included.
+fn footholds(plan: &Plan, foot: usize) -> impl Iterator<Item = (usize, [f64; 3])> {
+    let feet = plan.foot_names.len();
+    let stands = move |n: usize| plan.foot_contact[n * feet + foot];
+    foot_samples(plan, foot).filter(move |&(n, _)| stands(n) && (n == 0 || !stands(n - 1)))
+}
+
+/// The height of the grid at a place, bilinear; none beyond it.
+fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
+    let (u, v) = ((x - ground.origin[0]) / ground.spacing[0], (y - ground.origin[1]) / ground.spacing[1]);
+    let (most_u, most_v) = ((ground.columns - 1) as f64, (ground.rows - 1) as f64);
+    if !(0.0..=most_u).contains(&u) || !(0.0..=most_v).contains(&v) {
+        return None;
+    }
+    let (i, j) = ((u as usize).min(ground.columns - 2), (v as usize).min(ground.rows - 2));
+    let (a, b) = (u - i as f64, v - j as f64);
+    let h = |i: usize, j: usize| ground.height[j * ground.columns + i];
+    let low = h(i, j) * (1.0 - a) + h(i + 1, j) * a;
+    let high = h(i, j + 1) * (1.0 - a) + h(i + 1, j + 1) * a;
+    Some(low * (1.0 - b) + high * b)
+}
+
+/// Heights over the frame: `RASTER` × `RASTER` cell centres, row by row from the top.
+fn raster(axes: &Axes, ground: &GroundGrid) -> Vec<Option<f64>> {
+    let at = |[a, b]: [f64; 2], i: usize| a + (b - a) * (i as f64 + 0.5) / RASTER as f64;
+    let rows = (0..RASTER).rev().flat_map(|j| (0..RASTER).map(move |i| (i, j)));
+    rows.map(|(i, j)| height(ground, at(axes.x, i), at(axes.y, j))).collect()
+}
+
+/// Least and greatest height within the frame; at least 1 cm apart, so that flat ground shows no noise.
+fn height_range(raster: &[Option<f64>]) -> [f64; 2] {
+    let [low, high] = range(raster.iter().flatten().copied(), 0.0);
+    if high - low >= 0.01 { [low, high] } else { [low - 0.005, low + 0.005] }
+}
+
+/// Height as bands of colour: cells of one level are drawn as one strip.
+fn shading(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
+    let heights = raster(axes, ground);
+    let [low, high] = height_range(&heights);
+    let level =
+        |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1));
+    let [left, top, width, tall] = axes.frame;
+    let (cell_w, cell_h) = (width / RASTER as f64, tall / RASTER as f64);
+    for (j, row) in heights.chunks(RASTER).enumerate() {
+        let mut i = 0;
+        while i < RASTER {
+            let here = level(&row[i]);
+            let begin = i;
+            while i < RASTER && level(&row[i]) == here {
+                i += 1;
+            }
+            if let Some(here) = here {
+                // A hair larger than the cell, against seams.
+                let strip = [
+                    left + begin as f64 * cell_w,
+                    top + j as f64 * cell_h,
+                    (i - begin) as f64 * cell_w + 0.4,
+                    cell_h + 0.4,
+                ];
+                svg.rect(strip, &format!("fill=\"{}\"", ground_colour((here as f64 + 0.5) / LEVELS as f64)));
+            }
+        }
+    }
+}
+
+/// From pale blue (low) over sand to brown (high), light enough for paths to stand out.
+fn ground_colour(share: f64) -> String {
+    let stops = [[206.0, 222.0, 234.0], [243.0, 238.0, 222.0], [196.0, 160.0, 118.0]];
+    let (from, to, a) = if share < 0.5 { (0, 1, 2.0 * share) } else { (1, 2, 2.0 * share - 1.0) };
+    let mixed: [u8; 3] = std::array::from_fn(|c| (stops[from][c] * (1.0 - a) + stops[to][c] * a) as u8);
+    format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
+}
+
+/// What the colours mean, at the right border of the view from above.
+fn height_scale(svg: &mut Svg, plan: &Plan, axes: &Axes) {
+    let [low, high] = height_range(&raster(axes, &plan.ground));
+    let [left, top, width, tall] = axes.frame;
+    let (x, step) = (left + width + 8.0, tall / LEVELS as f64);
+    for i in 0..LEVELS {
+        let y = top + tall - (i + 1) as f64 * step;
+        svg.rect(
+            [x, y, 12.0, step + 0.4],
+            &format!("fill=\"{}\"", ground_colour((i as f64 + 0.5) / LEVELS as f64)),
+        );
+    }
+    let font = Font { size: 11.0, ..Font::TICK }.anchored("start");
+    svg.text([x, top - 6.0], &format!("{high:.2} m"), font);
+    svg.text([x, top + tall + 15.0], &format!("{low:.2} m"), font);
+}
+
+fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+    // Distance along the way from start to end; along x when there is no way.
+    let [a, b] = [plan.base_position[0], plan.base_position[plan.t.len() - 1]];
+    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+    let direction = if length > 0.05 { [(b[0] - a[0]) / length, (b[1] - a[1]) / length] } else { [1.0, 0.0] };
+    let along = move |p: &[f64; 3]| (p[0] - a[0]) * direction[0] + (p[1] - a[1]) * direction[1];
+
+    let x = range(plan.base_position.iter().chain(&plan.foot_position).map(along), 0.04);
+    // The ground on the straight line from start to end.
+    let profile: Vec<[f64; 2]> = (0..=240)
+        .map(|i| x[0] + (x[1] - x[0]) * f64::from(i) / 240.0)
+        .filter_map(|s| Some([s, height(&plan.ground, a[0] + s * direction[0], a[1] + s * direction[1])?]))
+        .collect();
+    let heights = plan.base_position.iter().chain(&plan.foot_position).map(|p| p[2]);
+    let y = range(heights.chain(profile.iter().map(|p| p[1])), 0.08);
+    let axes = Axes::equal(frame, x, y);
+    svg.clipped(frame, |svg| {
+        let floor = axes.y[0];
+        let ends = [profile.last(), profile.first()].into_iter().flatten().map(|p| [p[0], floor]);
+        let outline: Vec<[f64; 2]> =
+            profile.iter().copied().chain(ends).map(|[s, z]| axes.at(s, z)).collect();
+        svg.polygon(outline, "fill=\"#e6dcc6\" stroke=\"#8a7650\" stroke-width=\"1.2\"");
+    });
+    axes.draw(
+        svg,
+        "From the side, ground on the straight line from start to end",
+        "along the way, m",
+        "z, m",
+    );
+    svg.clipped(frame, |svg| {
+        for e in 0..plan.foot_names.len() {
+            let path = foot_samples(plan, e).map(|(_, p)| axes.at(along(&p), p[2]));
+            svg.polyline(path, &stroke(e, 1.3));
+        }
+        svg.polyline(plan.base_position.iter().map(|p| axes.at(along(p), p[2])), BASE);
+    });
+}
+
+fn time_range(plan: &Plan) -> [f64; 2] {
+    [plan.t[0], plan.t[plan.t.len() - 1]]
+}
+
+fn contacts(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+    let feet = plan.foot_names.len();
+    let axes = Axes::new(frame, time_range(plan), [0.0, feet as f64]);
+    axes.draw(svg, "Stance", "time, s", "");
+    let bar = frame[3] / feet as f64;
+    for (e, name) in plan.foot_names.iter().enumerate() {
+        let top = frame[1] + e as f64 * bar;
+        svg.text([frame[0] - 8.0, top + 0.5 * bar + 4.0], name, Font::TICK.anchored("end"));
+        let mut n = 0;
+        while n < plan.t.len() {
+            let begin = n;
+            while n < plan.t.len() && plan.foot_contact[n * feet + e] {
+                n += 1;
+            }
+            if n > begin {
+                let [[x1, _], [x2, _]] = [plan.t[begin], plan.t[n - 1]].map(|t| axes.at(t, 0.0));
+                svg.rect(
+                    [x1, top + 0.18 * bar, x2 - x1, 0.64 * bar],
+                    &format!("fill=\"{}\"", foot_colour(e)),
+                );
+            }
+            n += 1;
+        }
+    }
+}
+
+fn normal_forces(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+    let feet = plan.foot_names.len();
+    let along: Vec<f64> = plan
+        .foot_force
+        .iter()
+        .zip(&plan.foot_normal)
+        .map(|(force, normal)| (0..3).map(|k| force[k] * normal[k]).sum())
+        .collect();
+    let robot = &plan.meta.robot;
+    let weight = robot.mass * robot.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let [low, high] = range(along.iter().copied().chain([weight]), 0.05);
+    let axes = Axes::new(frame, time_range(plan), [low.min(0.0), high]);
+    axes.draw(svg, "Normal force by foot; dashed: the robot's weight", "time, s", "force, N");
+    svg.clipped(frame, |svg| {
+        let ends = time_range(plan).map(|t| axes.at(t, weight));
+        svg.line(ends[0], ends[1], "stroke=\"#555\" stroke-dasharray=\"6 4\"");
+        for e in 0..feet {
+            let points = (0..plan.t.len()).map(|n| axes.at(plan.t[n], along[n * feet + e]));
+            svg.polyline(points, &stroke(e, 1.3));
+        }
+    });
+}
+
+fn convergence(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+    let violation = &plan.history_constraint_violation;
+    let axes = Axes::logarithmic(frame, [0.0, violation.len().saturating_sub(1).max(1) as f64], violation);
+    axes.draw(svg, "Largest violation by iteration", "iteration", "units of the NLP");
+    if violation.is_empty() {
+        let middle = [frame[0] + 0.5 * frame[2], frame[1] + 0.5 * frame[3]];
+        return svg.text(middle, "no history in the plan", Font::LABEL);
+    }
+    // A violation of zero has no logarithm; it is drawn at the bottom.
+    let floor = 10f64.powf(axes.y[0]);
+    let points = || violation.iter().enumerate().map(|(i, v)| axes.at(i as f64, v.max(floor)));
+    svg.clipped(frame, |svg| svg.polyline(points(), "stroke=\"#2166ac\" stroke-width=\"1.6\""));
+    if violation.len() <= 60 {
+        points().for_each(|point| svg.circle(point, 2.6, "fill=\"#2166ac\""));
+    }
+}

@@ -1,0 +1,138 @@
+//! A small writer of SVG.
+
+use std::fmt::{Display, Write};
+
+/// Colours that stay apart for most people, also when printed; one per foot, again from the start after the last.
+const FEET: [&str; 6] = ["#c8352c", "#2166ac", "#e08214", "#1b8a5a", "#7b3fa0", "#6b6b6b"];
+
+/// The colour of a foot.
+pub(super) fn foot_colour(foot: usize) -> &'static str {
+    FEET[foot % FEET.len()]
+}
+
+/// A drawing in the making; lengths are pixels, y points down.
+pub(super) struct Svg {
+    width: f64,
+    height: f64,
+    body: String,
+    clips: usize,
+}
+
+/// How a text is set.
+#[derive(Clone, Copy)]
+pub(super) struct Font {
+    pub size: f64,
+    /// `start`, `middle` or `end`.
+    pub anchor: &'static str,
+    pub bold: bool,
+    pub colour: &'static str,
+}
+
+impl Font {
+    pub const TICK: Font = Font { size: 12.0, anchor: "middle", bold: false, colour: "#444" };
+    pub const LABEL: Font = Font { size: 13.0, anchor: "middle", bold: false, colour: "#222" };
+    pub const TITLE: Font = Font { size: 14.5, anchor: "start", bold: true, colour: "#111" };
+
+    pub const fn anchored(self, anchor: &'static str) -> Font {
+        Font { anchor, ..self }
+    }
+}
+
+impl Svg {
+    pub fn new(width: f64, height: f64) -> Self {
+        Self { width, height, body: String::new(), clips: 0 }
+    }
+
+    /// The whole file.
+    pub fn finish(self) -> String {
+        let Self { width, height, body, .. } = self;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             font-family=\"'DejaVu Sans', Verdana, Helvetica, Arial, sans-serif\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{body}</svg>\n"
+        )
+    }
+
+    /// One element from its name and attributes.
+    fn element(&mut self, element: impl Display) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.body, "<{element}/>");
+    }
+
+    pub fn rect(&mut self, [x, y, w, h]: [f64; 4], style: &str) {
+        self.element(format_args!(
+            "rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" {style}"
+        ));
+    }
+
+    pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: &str) {
+        self.element(format_args!("circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" {style}"));
+    }
+
+    pub fn line(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], style: &str) {
+        self.element(format_args!(
+            "line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" {style}"
+        ));
+    }
+
+    /// A line through points; points too close to be told apart are left out.
+    pub fn polyline(&mut self, points: impl IntoIterator<Item = [f64; 2]>, style: &str) {
+        let mut text = String::new();
+        let mut last: Option<[f64; 2]> = None;
+        let mut pending = None;
+        for [x, y] in points {
+            if last.is_some_and(|[a, b]| (x - a).hypot(y - b) < 0.4) {
+                pending = Some([x, y]);
+                continue;
+            }
+            let _ = write!(text, "{x:.1},{y:.1} ");
+            last = Some([x, y]);
+            pending = None;
+        }
+        if let Some([x, y]) = pending {
+            let _ = write!(text, "{x:.1},{y:.1}");
+        }
+        self.element(format_args!(
+            "polyline points=\"{}\" fill=\"none\" stroke-linejoin=\"round\" {style}",
+            text.trim_end()
+        ));
+    }
+
+    /// A closed area through points.
+    pub fn polygon(&mut self, points: impl IntoIterator<Item = [f64; 2]>, style: &str) {
+        let text: Vec<String> = points.into_iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        self.element(format_args!("polygon points=\"{}\" {style}", text.join(" ")));
+    }
+
+    pub fn text(&mut self, at: [f64; 2], text: &str, font: Font) {
+        self.turned_text(at, text, font, 0.0);
+    }
+
+    /// A text turned by an angle in degrees about its anchor.
+    pub fn turned_text(&mut self, [x, y]: [f64; 2], text: &str, font: Font, angle: f64) {
+        let Font { size, anchor, bold, colour } = font;
+        let weight = if bold { " font-weight=\"bold\"" } else { "" };
+        let turn = if angle == 0.0 {
+            String::new()
+        } else {
+            format!(" transform=\"rotate({angle} {x:.1} {y:.1})\"")
+        };
+        let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        let _ = writeln!(
+            self.body,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{weight}{turn}>{text}</text>"
+        );
+    }
+
+    /// Draws within a rectangle only.
+    pub fn clipped(&mut self, [x, y, w, h]: [f64; 4], draw: impl FnOnce(&mut Self)) {
+        self.clips += 1;
+        let id = self.clips;
+        let _ = writeln!(
+            self.body,
+            "<clipPath id=\"c{id}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\"/></clipPath>\n<g clip-path=\"url(#c{id})\">"
+        );
+        draw(self);
+        self.body.push_str("</g>\n");
+    }
+}

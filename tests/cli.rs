@@ -1,0 +1,159 @@
+//! The command line: exit codes, one clear message, nothing half written.
+
+mod common;
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output =
+        Command::cargo_bin("warpgait").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+/// Bad input: exit code 2, nothing on standard output, one line on standard error that has all the `parts`.
+fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let before = files(folder);
+    let (code, out, err) = warpgait(folder, arguments);
+    assert_eq!(code, 2, "{arguments:?}: {out}{err}");
+    assert_eq!(out, "", "{arguments:?}");
+    assert_eq!(err.trim_end().lines().count(), 1, "{err}");
+    for part in parts {
+        assert!(err.contains(part), "`{part}` is not in: {err}");
+    }
+    assert_eq!(files(folder), before, "{arguments:?} left something behind");
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_and_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["--help"]);
+    assert_eq!(code, 0);
+    assert!(out.contains("Examples:") && out.contains("Exit codes:"), "{out}");
+    assert_eq!(warpgait(folder.path(), &["--version"]).0, 0);
+    assert_eq!(warpgait(folder.path(), &[]).0, 2);
+    assert_eq!(warpgait(folder.path(), &["chekc"]).0, 2);
+    assert_eq!(warpgait(folder.path(), &["check"]).0, 2);
+}
+
+#[test]
+fn init_writes_a_scenario_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, err) = warpgait(folder.path(), &["init", "hill"]);
+    assert_eq!((code, out.trim()), (0, "hill.toml"));
+    assert!(err.contains("warpgait solve hill.toml"));
+    warpgait::scenario::load(&folder.path().join("hill.toml"), &[]).unwrap();
+    refused(folder.path(), &["init", "hill.toml"], &["hill.toml", "--force"]);
+    assert_eq!(warpgait(folder.path(), &["init", "hill", "--force"]).0, 0);
+    refused(folder.path(), &["init", "no/such/folder"], &["there is no folder no/such"]);
+    let (_, out, err) = warpgait(folder.path(), &["init", "quiet", "--quiet", "--json"]);
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["scenario"], "quiet.toml");
+    assert_eq!(err, "");
+}
+
+#[test]
+fn schema_is_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["schema"]);
+    assert_eq!(code, 0);
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["title"], "Scenario");
+}
+
+#[test]
+fn check_tells_good_from_bad() {
+    let folder = tempfile::tempdir().unwrap();
+    common::lifting(0.08).write(&folder.path().join("good.plan.npz")).unwrap();
+    common::lifting(0.04).write(&folder.path().join("low.plan.npz")).unwrap();
+    let mut unsolved = common::standing();
+    unsolved.meta.solver.success = false;
+    unsolved.write(&folder.path().join("unsolved.plan.npz")).unwrap();
+
+    let (code, out, err) = warpgait(folder.path(), &["check", "good.plan.npz"]);
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    assert!(out.contains("newton_rms") && out.contains("checks hold.") && !out.contains('\x1b'), "{out}");
+    let (code, out, _) = warpgait(folder.path(), &["check", "low.plan.npz"]);
+    assert_eq!(code, 1);
+    let line = out.lines().find(|line| line.starts_with("swing_apex_shortfall")).unwrap();
+    assert!(line.contains("FAILS") && line.contains("0.500 s LF"), "{line}");
+    let (code, out, _) = warpgait(folder.path(), &["check", "unsolved.plan.npz"]);
+    assert!(code == 1 && out.contains("not solved"), "{out}");
+    assert_eq!(warpgait(folder.path(), &["check", "low.plan.npz", "--quiet"]).1, "");
+
+    let (code, out, _) = warpgait(folder.path(), &["check", "low.plan.npz", "--json"]);
+    let object: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, &object["passed"]), (1, &Value::Bool(false)));
+    let row = object["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|row| row["name"] == "swing_apex_shortfall")
+        .unwrap();
+    assert_eq!((&row["passed"], &row["foot"]), (&Value::Bool(false), &Value::from("LF")));
+
+    std::fs::write(folder.path().join("limits.toml"), "swing_apex_shortfall = 30\n").unwrap();
+    assert_eq!(warpgait(folder.path(), &["check", "low.plan.npz", "--limits", "limits.toml"]).0, 0);
+    let (code, _, _) = warpgait(folder.path(), &["check", "low.plan.npz", "--plot", "low.svg"]);
+    assert!(code == 1 && std::fs::read_to_string(folder.path().join("low.svg")).unwrap().starts_with("<svg"));
+}
+
+#[test]
+fn check_refuses_bad_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    common::standing().write(&at("good.plan.npz")).unwrap();
+    let whole = std::fs::read(at("good.plan.npz")).unwrap();
+    std::fs::write(at("half.plan.npz"), &whole[..whole.len() / 2]).unwrap();
+    let mut newer = common::standing();
+    newer.meta.schema = 2;
+    newer.write(&at("newer.plan.npz")).unwrap();
+    let mut odd = common::standing();
+    odd.meta.scenario = "horizon = nan".into();
+    odd.write(&at("odd.plan.npz")).unwrap();
+    std::fs::write(at("limits.toml"), "newton = 3\n").unwrap();
+
+    refused(folder.path(), &["check", "none.plan.npz"], &["none.plan.npz"]);
+    refused(folder.path(), &["check", "half.plan.npz"], &["half.plan.npz", "cut short"]);
+    refused(folder.path(), &["check", "newer.plan.npz"], &["newer.plan.npz", "`meta`", "schema 2 is newer"]);
+    refused(folder.path(), &["check", "odd.plan.npz"], &["meta.scenario:1: horizon: given nan"]);
+    refused(folder.path(), &["check", "limits.toml"], &["limits.toml", "not an .npz archive"]);
+    refused(folder.path(), &["check", "good.plan.npz", "--limits", "limits.toml"], &["newton: no such law"]);
+    refused(
+        folder.path(),
+        &["check", "good.plan.npz", "--plot", "no/such.svg"],
+        &["no/such.svg", "there is no folder"],
+    );
+    refused(folder.path(), &["check", "."], &["."]);
+
+    let (code, out, _) = warpgait(folder.path(), &["check", "half.plan.npz", "--json"]);
+    assert_eq!(code, 2);
+    assert!(
+        serde_json::from_str::<Value>(&out).unwrap()["error"].as_str().unwrap().contains("half.plan.npz")
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn validate_hands_over_to_python() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let bin = folder.path().join(".venv/bin");
+    std::fs::create_dir_all(&bin).unwrap();
+    // Stands in for Python: the package is there, the replay prints its arguments and judges "not trackable".
+    let script = "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\necho \"$@\"\nexit 1\n";
+    std::fs::write(bin.join("python"), script).unwrap();
+    std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--friction", "0.5"]);
+    assert_eq!((code, out.trim()), (1, "-m warpgait.validate a.plan.npz --friction 0.5"));
+    let (_, out, _) = warpgait(folder.path(), &["--json", "validate", "a.plan.npz"]);
+    assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
+}
