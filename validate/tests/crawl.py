@@ -102,7 +102,7 @@ def make(
     E = len(feet)
     order = [feet.index(f) for f in ("RH", "RF", "LH", "LF")]
     rest = 0.4
-    duration = 1.0 if steps == 0 else 2 * rest + steps * (shift + swing)
+    duration = 1.0 if steps == 0 else rest + 1.0 + steps * (shift + swing)
     N = int(round(duration * RATE)) + 1
     t = np.arange(N) / RATE
 
