@@ -44,7 +44,7 @@ class Gains:
     weight_force: float = 1e-3
     weight_acceleration: float = 1e-3
     least_normal_force: float = 5.0  # N, on feet that do not stick
-    joint: tuple[float, float] = (600.0, 12.0)  # N m/rad, N m s/rad, of the joint PD
+    joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
 
 
 class Controller(Protocol):
@@ -175,6 +175,7 @@ class JointPD:
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
         spline = make_interp_spline(t, np.unwrap(joints, axis=0), k=3)
         self._q, self._v = spline(reference.t), spline(reference.t, 1)
+        self._stiffness, self._damping = np.array(self.gains.joint) * model.body_mass.sum()
         self._J = np.zeros((3, model.nv))
         self.failures = 0
 
@@ -187,8 +188,9 @@ class JointPD:
             point = data.site_xpos[index.site[e]] - index.radius * self.reference.normal[k, e]
             mujoco.mj_jac(self.model, data, self._J, None, point, index.body[e])
             forward[e] -= self._J[:, index.qvel[e]].T @ self.reference.force[k, e]
-        stiffness, damping = self.gains.joint
         result: Array = np.clip(
-            forward + stiffness * (self._q[k] - q) + damping * (self._v[k] - v), -index.torque_limit, index.torque_limit
+            forward + self._stiffness * (self._q[k] - q) + self._damping * (self._v[k] - v),
+            -index.torque_limit,
+            index.torque_limit,
         )
         return result

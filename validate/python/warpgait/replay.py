@@ -17,6 +17,7 @@ from .reference import Reference
 from .scene import Disturbance
 
 SETTLE = 0.3  # s of standing at the first sample before the plan's clock starts
+PRESS = 5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that none starts in the air
 TILT_LIMIT = np.deg2rad(35.0)
 STRAY_LIMIT = 0.5  # m: a centre of mass this far off is a fall, whatever the trunk's attitude
 
@@ -132,6 +133,7 @@ def run(
     disturbance = disturbance or Disturbance()
     data = mujoco.MjData(world)
     data.qpos[:] = qpos
+    data.qpos[2] -= PRESS
     period = reference.t[1]
     substeps = max(1, int(round(period / world.opt.timestep)))
     ground, measured = _Feet(world, index), _Measurement(own_model, disturbance, period)
@@ -141,7 +143,6 @@ def run(
     log: dict[str, list[Any]] = {n: [] for n in ("qpos", "qvel", "torque", "com", "turn", "foot", "force", "slip", "stray")}
     fall, first_stray = None, None
     jacobian = np.zeros((3, world.nv))
-    warnings_off = mujoco.mjtWarning.mjWARN_BADQACC
     for step in range(-settle, K):
         k = max(step, 0)
         data.xfrc_applied[base, :3] = 0.0
@@ -151,8 +152,7 @@ def run(
         for sub in range(substeps):
             mujoco.mj_step1(world, data)
             if sub == 0:
-                touching = data.ncon > 0 and _touching(data, ground, E)
-                seen = measured.take(data.qpos, data.qvel, touching if data.ncon else np.zeros(E, bool))
+                seen = measured.take(data.qpos, data.qvel, _touching(data, ground, E))
                 torque = controller.torque(k, measured.data, seen)
                 data.ctrl[motors] = torque.ravel()
                 for e, actuator in ground.adhesion:
@@ -163,7 +163,7 @@ def run(
             mujoco.mj_step2(world, data)
             if sub == 0:
                 force, touching_now, stray = ground.read(data)
-        if data.warning[warnings_off].number or not np.isfinite(data.qpos).all():
+        if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all():
             fall = Incident(max(step * period, 0.0), "the simulation blew up")
             break
         for e in np.flatnonzero(touching_now & reference.contact[k]):
@@ -207,8 +207,10 @@ def run(
 
 def _touching(data: Any, ground: _Feet, feet: int) -> Bools:
     """Which feet are in contact, before forces are known."""
+    result = np.zeros(feet + 1, bool)
+    if data.ncon == 0:
+        return result[:-1]
     geom = data.contact.geom
     other = np.where(geom[:, 0] == ground.ground, geom[:, 1], geom[:, 0])
-    result = np.zeros(feet + 1, bool)
     result[ground.foot_of_geom[other]] = True  # -1, no foot, lands in the spare last place
     return result[:-1]
