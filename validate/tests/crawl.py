@@ -5,6 +5,7 @@ The body shifts over the next support triangle, stops, and one foot steps; force
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,6 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
-
 from warpgait.model import Composite, composite, find_model, foot_names, indices, load_spec, stand
 from warpgait.plan import Array
 
@@ -42,7 +42,8 @@ def normal(height: Height, p: Array) -> Array:
     gx = (height(p[0] + e, p[1]) - height(p[0] - e, p[1])) / (2 * e)
     gy = (height(p[0], p[1] + e) - height(p[0], p[1] - e)) / (2 * e)
     n = np.array([-gx, -gy, 1.0])
-    return n / np.linalg.norm(n)
+    n /= np.linalg.norm(n)
+    return n
 
 
 def smooth_step(s: Array) -> Array:
@@ -72,13 +73,18 @@ def distribute(wrench: Array, arms: Array, normals: Array, weight: Array, fricti
         tx = np.cross([0, 1, 0], n)
         tx /= np.linalg.norm(tx)
         ty = np.cross(n, tx)
-        for row, least in [*((friction / np.sqrt(2) * n - s, -friction / np.sqrt(2) * pull[j]) for s in (tx, -tx, ty, -ty)), (n, -pull[j])]:
+        for row, least in [
+            *((friction / np.sqrt(2) * n - s, -friction / np.sqrt(2) * pull[j]) for s in (tx, -tx, ty, -ty)),
+            (n, -pull[j]),
+        ]:
             C.append(np.zeros(3 * k))
             C[-1][3 * j : 3 * j + 3] = row
             lower.append(least)
     scale = np.array([1, 1, 1, 3, 3, 3.0])
     H = 1e6 * G.T @ (scale[:, None] ** 2 * G) + np.diag(np.repeat(weight, 3))
-    x, _, flag, _ = daqp.solve(H, -1e6 * G.T @ (scale**2 * wrench), np.array(C), np.full(len(C), 1e30), np.array(lower), np.zeros(len(C), np.int32))
+    x, _, flag, _ = daqp.solve(
+        H, -1e6 * G.T @ (scale**2 * wrench), np.array(C), np.full(len(C), 1e30), np.array(lower), np.zeros(len(C), np.int32)
+    )
     assert flag > 0
     return np.asarray(x).reshape(k, 3)
 
@@ -103,7 +109,7 @@ def make(
     order = [feet.index(f) for f in ("RH", "RF", "LH", "LF")]
     rest = 0.4
     duration = 1.0 if steps == 0 else rest + 1.0 + steps * (shift + swing)
-    N = int(round(duration * RATE)) + 1
+    N = round(duration * RATE) + 1
     t = np.arange(N) / RATE
 
     holds = nominal.copy()
@@ -122,7 +128,11 @@ def make(
         inside = (t > start + 1e-9) & (t < start + swing - 1e-9)
         s = ((t[inside] - start) / swing)[:, None]
         lift = clearance + abs(goal[2] - holds[i, 2])
-        foot[inside, i] = holds[i] + (goal - holds[i]) * smooth_step(s) + 64 * s**3 * (1 - s) ** 3 * lift * normal(height, (goal + holds[i]) / 2)
+        foot[inside, i] = (
+            holds[i]
+            + (goal - holds[i]) * smooth_step(s)
+            + 64 * s**3 * (1 - s) ** 3 * lift * normal(height, (goal + holds[i]) / 2)
+        )
         contact[inside, i] = False
         ends[t <= start + 1e-9, i, 1] = np.minimum(ends[t <= start + 1e-9, i, 1], start)
         after = t >= start + swing - 1e-9
@@ -132,7 +142,7 @@ def make(
     waypoints += [(duration - 0.1, holds.mean(0)), (duration, holds.mean(0))] if steps else [(duration, holds.mean(0))]
 
     com = np.zeros((N, 3))
-    for (t0, a), (t1, b) in zip(waypoints[:-1], waypoints[1:], strict=True):
+    for (t0, a), (t1, b) in itertools.pairwise(waypoints):
         inside = (t >= t0 - 1e-9) & (t <= t1 + 1e-9)
         com[inside] = a + (b - a) * smooth_step(((t[inside] - t0) / max(t1 - t0, 1e-9))[:, None])
     com[:, 2] += -nominal[:, 2].mean()
@@ -154,7 +164,9 @@ def make(
     pull = np.array([1.2 * body.mass * GRAVITY if f in adhesive else 0.0 for f in feet])
     for k in range(N):
         inertia = R[k] @ body.inertia @ R[k].T
-        wrench = np.r_[body.mass * (acceleration[k] + [0, 0, GRAVITY]), inertia @ alpha[k] + np.cross(omega[k], inertia @ omega[k])]
+        wrench = np.r_[
+            body.mass * (acceleration[k] + [0, 0, GRAVITY]), inertia @ alpha[k] + np.cross(omega[k], inertia @ omega[k])
+        ]
         stance = np.flatnonzero(contact[k])
         ramp = np.clip(np.minimum(t[k] - ends[k, stance, 0], ends[k, stance, 1] - t[k]) / 0.12, 0.03, 1.0)
         force[k, stance] = distribute(wrench, foot[k, stance] - com[k], normals[k, stance], ramp**-2, friction, pull[stance])
@@ -163,7 +175,13 @@ def make(
     xs, ys = np.arange(x_min, x_max + spacing / 2, spacing), np.arange(y_min, y_max + spacing / 2, spacing)
     meta = {
         "schema": 1,
-        "robot": {"name": robot, "mass": body.mass, "inertia": body.inertia.tolist(), "friction": friction, "gravity": [0, 0, -GRAVITY]},
+        "robot": {
+            "name": robot,
+            "mass": body.mass,
+            "inertia": body.inertia.tolist(),
+            "friction": friction,
+            "gravity": [0, 0, -GRAVITY],
+        },
         "solver": {"status": "made by hand", "success": True},
         "scenario": "",
     }
@@ -190,3 +208,12 @@ def make(
         meta=np.array(json.dumps(meta)),
     )
     return path
+
+
+def altered(source: Path, target: Path, change: Callable[[dict[str, Any]], None]) -> Path:
+    """A copy of a plan with its members changed by `change`."""
+    with np.load(source) as archive:
+        members = {name: archive[name] for name in archive.files}
+    change(members)
+    np.savez_compressed(target, **members)
+    return target

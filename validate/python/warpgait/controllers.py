@@ -65,7 +65,14 @@ class WholeBody:
     """
 
     def __init__(
-        self, model: Any, index: Indices, reference: Reference, friction: float, pull: Array, preload: Array, gains: Gains | None = None
+        self,
+        model: Any,
+        index: Indices,
+        reference: Reference,
+        friction: float,
+        pull: Array,
+        preload: Array,
+        gains: Gains | None = None,
     ) -> None:
         """`pull` (E,): how hard a foot may pull, N; `preload` (E,): adhesion that friction adds to the normal force, N."""
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
@@ -170,7 +177,9 @@ class WholeBody:
 class JointPD:
     """Joint PD around the inverse kinematics of the plan, with the legs' gravity and the planned forces fed forward."""
 
-    def __init__(self, model: Any, index: Indices, reference: Reference, t: Array, joints: Array, gains: Gains | None = None) -> None:
+    def __init__(
+        self, model: Any, index: Indices, reference: Reference, t: Array, joints: Array, gains: Gains | None = None
+    ) -> None:
         """`joints` (N, E, 3): joint angles at times `t` (N,)."""
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
         spline = make_interp_spline(t, np.unwrap(joints, axis=0), k=3)

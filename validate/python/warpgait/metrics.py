@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -47,7 +48,9 @@ class Metric:
     @property
     def verdict(self) -> Verdict:
         """NaN fails."""
-        value, passes, marginal = (-self.value, -self.passes, -self.marginal) if self.at_least else (self.value, self.passes, self.marginal)
+        value, passes, marginal = (
+            (-self.value, -self.passes, -self.marginal) if self.at_least else (self.value, self.passes, self.marginal)
+        )
         if value <= passes:
             return Verdict.PASS
         return Verdict.MARGINAL if value <= marginal else Verdict.FAIL
@@ -56,13 +59,13 @@ class Metric:
 LEVER = 0.3  # m: torques are judged against m g times this
 
 
-def _rms(vectors: Array) -> float:
+def _rms(vectors: Any) -> float:
     """Root of the mean squared length of vectors (..., d)."""
     return float(np.sqrt((vectors**2).sum(-1).mean())) if vectors.size else float("nan")
 
 
-def _first(flags: Bools) -> tuple[int, int] | None:
-    """Sample and foot of the first true entry of (N, E)."""
+def _first(flags: Any) -> tuple[int, int] | None:
+    """Sample and foot of the first true entry of (N, E) flags."""
     found = np.argwhere(flags)
     return (int(found[0][0]), int(found[0][1])) if len(found) else None
 
@@ -77,9 +80,13 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
         Metric(layer, "postures out of reach", float(result.unreachable.sum()), "", 0, 0),
         Metric(layer, "postures past a joint limit", float(result.beyond_limits.sum()), "", 0, 0),
         Metric(layer, "plan: unexplained force, rms", 100 * _rms(result.plan_residual[:, :3]) / mg, "% m g", 1, 5),
-        Metric(layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 1, 5),
+        Metric(
+            layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 1, 5
+        ),
         Metric(layer, "full body: unexplained force, rms", _rms(result.body_residual[:, :3]) / mg, "m g", 0.12, 0.20),
-        Metric(layer, "full body: unexplained torque, rms", _rms(result.body_residual[:, 3:]) / (mg * LEVER), "m g·0.3 m", 0.10, 0.20),
+        Metric(
+            layer, "full body: unexplained torque, rms", _rms(result.body_residual[:, 3:]) / (mg * LEVER), "m g·0.3 m", 0.10, 0.20
+        ),
         Metric(layer, "peak joint torque", float(share.max()), "of limit", 0.9, 1.0),
         Metric(layer, "peak joint speed", float(speed.max()), "of limit", 0.9, 1.0),
     ]
@@ -107,14 +114,14 @@ class Filtered:
 def filtered_forces(replay: Replay, reference: Reference) -> Filtered:
     """Average both over 20 ms, so that an impact of two milliseconds does not hide the rest."""
     K = len(replay.t)
-    width = max(1, int(round(0.02 / reference.t[1])))
+    width = max(1, round(0.02 / reference.t[1]))
     return Filtered(
         uniform_filter1d(replay.force, width, axis=0, mode="nearest"),
         uniform_filter1d(reference.force[:K], width, axis=0, mode="nearest"),
     )
 
 
-def _persistent(flags: Bools, samples: int) -> Bools:
+def _persistent(flags: Any, samples: int) -> Bools:
     """True where flags (K, E) have been true for `samples` in a row."""
     run = np.zeros(flags.shape, int)
     for k in range(len(flags)):
@@ -142,7 +149,7 @@ def closed_loop(
     stances = int(planned[0].sum() + (planned[1:] & ~planned[:-1]).sum())
     saturated = np.abs(replay.torque) > 0.98 * index.torque_limit
     both = np.stack([forces.simulated[..., 2].ravel(), forces.planned[..., 2].ravel()])
-    correlation = float(np.corrcoef(both)[0, 1]) if both.std(1).min() > 1.0 else 1.0
+    correlation = float(np.asarray(np.corrcoef(both))[0, 1]) if both.std(1).min() > 1.0 else 1.0
     metrics = [
         Metric(layer, "fall", fell, "", 0, 0),
         Metric(layer, "contacts other than feet", float((replay.stray_contacts > 0).sum()), "samples", 0, 0),
@@ -155,11 +162,11 @@ def closed_loop(
         Metric(layer, "slip per step", 1e3 * float(replay.slip.sum()) / max(stances, 1), "mm", 3, 10),
         Metric(layer, "contact mismatch", 100 * float((contact != planned).mean()), "% of samples", 1.5, 4),
         Metric(layer, "torque at its limit", 100 * float(saturated.mean()), "% of samples", 0.5, 6),
-        Metric(layer, "foot forces, rms", float(np.sqrt((difference**2).sum((1, 2)).mean())) / mg, "m g", 0.08, 0.15),
-        Metric(layer, "net force, rms", _rms(difference.sum(1)) / mg, "m g", 0.07, 0.15),
+        Metric(layer, "foot forces, rms", float(np.sqrt(np.sum(difference**2, axis=(1, 2)).mean())) / mg, "m g", 0.08, 0.15),
+        Metric(layer, "net force, rms", _rms(np.sum(difference, axis=1)) / mg, "m g", 0.07, 0.15),
         Metric(layer, "vertical force, correlation", correlation, "", 0.98, 0.95, at_least=True),
     ]
-    patience = max(1, int(round(0.05 / period)))
+    patience = max(1, round(0.05 / period))
     for flags, what in (
         (_persistent(planned & ~contact, patience), "no contact for 50 ms where contact is planned"),
         (_persistent(contact & ~planned, patience), "contact for 50 ms where a swing is planned"),

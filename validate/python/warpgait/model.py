@@ -58,7 +58,7 @@ def find_model(name: str) -> Path:
             return path
     known = ", ".join(available_models()) or "none (set WARPGAIT_ROBOTS to the folder that holds them)"
     raise InputError(
-        f"robot \"{name}\" has no full model (robots/{name}.xml). Models at hand: {known}. "
+        f'robot "{name}" has no full model (robots/{name}.xml). Models at hand: {known}. '
         "Plan for one of these, or name a model to replay on with --model (its mass and legs will differ from the plan's)."
     )
 

@@ -49,7 +49,8 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
         gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
         ok &= (gap > 0).any(-1)
     side = np.sign([leg.hip[0], leg.hip[1]])
-    return ok & (contact[..., 0] * side[0] > rules.side) & (contact[..., 1] * side[1] > rules.side)
+    ok &= (contact[..., 0] * side[0] > rules.side) & (contact[..., 1] * side[1] > rules.side)
+    return ok
 
 
 def largest_rectangle(mask: Mask) -> tuple[int, int, int, int, int]:
@@ -69,7 +70,9 @@ def largest_rectangle(mask: Mask) -> tuple[int, int, int, int, int]:
     return best
 
 
-def largest_cuboid(mask: Mask, least: tuple[int, int, int] = (1, 1, 1)) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
+def largest_cuboid(
+    mask: Mask, least: tuple[int, int, int] = (1, 1, 1)
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
     """First and last index (3,) of the largest all-true cuboid with at least `least` cells an axis; None if there is none.
 
     Every range of layers is intersected, and the largest rectangle of the intersection taken.

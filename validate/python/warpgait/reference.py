@@ -36,7 +36,7 @@ def sample(plan: Plan, rate: float, foot_radius: float) -> Reference:
     Positions by cubic Hermite interpolation of the plan's samples and velocities, orientation by spherical interpolation,
     all else linearly; contact is that of the sample before. A force counts only while its foot is in contact.
     """
-    t = np.arange(int(round(plan.duration * rate)) + 1) / rate
+    t = np.arange(round(plan.duration * rate) + 1) / rate
     t = np.minimum(t, plan.duration)
     before = np.clip(np.floor(t / plan.t[1] + 1e-6).astype(int), 0, len(plan.t) - 1)
     contact = plan.foot_contact[before]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,9 @@ from .reference import Reference
 from .scene import Disturbance
 
 SETTLE = 0.3  # s of standing at the first sample before the plan's clock starts
-PRESS = 5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that none starts in the air
+PRESS = (
+    5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that none starts in the air
+)
 TILT_LIMIT = np.deg2rad(35.0)
 STRAY_LIMIT = 0.5  # m: a centre of mass this far off is a fall, whatever the trunk's attitude
 
@@ -97,7 +98,7 @@ class _Measurement:
     def __init__(self, model: Any, disturbance: Disturbance, period: float) -> None:
         self.model, self.data = model, mujoco.MjData(model)
         self.noise, self.rng = disturbance.noise, np.random.default_rng(disturbance.seed)
-        self.queue: deque[tuple[Array, Array, Bools]] = deque(maxlen=int(round(disturbance.delay / period)) + 1)
+        self.queue: deque[tuple[Array, Array, Bools]] = deque(maxlen=round(disturbance.delay / period) + 1)
 
     def take(self, qpos: Array, qvel: Array, touching: Bools) -> Bools:
         """Note the true state; `data` then holds the measured one, and the measured contacts are returned."""
@@ -124,22 +125,21 @@ def run(
     controller: Controller,
     qpos: Array,
     disturbance: Disturbance | None = None,
-    on_step: Callable[[float, Any], None] | None = None,
 ) -> Replay:
     """Simulate `world` from posture `qpos` (nq,) under `controller`, which looks at `own_model` (no contacts).
 
-    The first sample of the reference is held for SETTLE seconds. Stops at a fall. `on_step(t, data)` is called at every control step.
+    The first sample of the reference is held for SETTLE seconds. Stops at a fall.
     """
     disturbance = disturbance or Disturbance()
     data = mujoco.MjData(world)
     data.qpos[:] = qpos
     data.qpos[2] -= PRESS
     period = reference.t[1]
-    substeps = max(1, int(round(period / world.opt.timestep)))
+    substeps = max(1, round(period / world.opt.timestep))
     ground, measured = _Feet(world, index), _Measurement(own_model, disturbance, period)
     motors, base = index.actuator.ravel(), index.base
     K, E = len(reference.t), len(index.feet)
-    settle = int(round(SETTLE / period))
+    settle = round(SETTLE / period)
     log: dict[str, list[Any]] = {n: [] for n in ("qpos", "qvel", "torque", "com", "turn", "foot", "force", "slip", "stray")}
     fall, first_stray = None, None
     jacobian = np.zeros((3, world.nv))
@@ -166,25 +166,40 @@ def run(
         if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all():
             fall = Incident(max(step * period, 0.0), "the simulation blew up")
             break
-        for e in np.flatnonzero(touching_now & reference.contact[k]):
+        for e in map(int, np.flatnonzero(touching_now & reference.contact[k])):
             mujoco.mj_jac(world, data, jacobian, None, centers[e] - index.radius * reference.normal[k, e], index.body[e])
             velocity = jacobian @ data.qvel
             n = reference.normal[k, e]
             slip[e] = np.linalg.norm(velocity - n * (n @ velocity)) * period
         tilt = np.arccos(np.clip(data.xmat[base].reshape(3, 3)[:, 2] @ reference.rotation[k][:, 2], -1, 1))
         off = float(np.linalg.norm(reference.com[k] - state[2]))
-        if stray and first_stray is None:
+        if stray and first_stray is None and step >= 0:
             body = world.body(world.geom_bodyid[stray[0]]).name
-            first_stray = Incident(max(step * period, 0.0), f"{body} touches the ground", next((f for f in index.feet if body.startswith(f)), None))
+            first_stray = Incident(
+                step * period, f"{body} touches the ground", next((f for f in index.feet if body.startswith(f)), None)
+            )
         if step >= 0:
             for name, value in zip(
-                log, (*state[:2], np.clip(torque, -index.torque_limit, index.torque_limit), state[2], turn, centers, force, slip, len(stray)), strict=True
+                log,
+                (
+                    *state[:2],
+                    np.clip(torque, -index.torque_limit, index.torque_limit),
+                    state[2],
+                    turn,
+                    centers,
+                    force,
+                    slip,
+                    len(stray),
+                ),
+                strict=True,
             ):
                 log[name].append(value)
-        if on_step is not None and step >= 0:
-            on_step(step * period, data)
         if tilt > TILT_LIMIT or off > STRAY_LIMIT:
-            what = f"the trunk tilts {np.degrees(tilt):.0f}° off the plan" if tilt > TILT_LIMIT else f"the centre of mass is {off:.2f} m off"
+            what = (
+                f"the trunk tilts {np.degrees(tilt):.0f}° off the plan"
+                if tilt > TILT_LIMIT
+                else f"the centre of mass is {off:.2f} m off"
+            )
             fall = Incident(max(step * period, 0.0), f"fall: {what}")
             break
     arrays = {name: np.array(values) for name, values in log.items()}

@@ -86,9 +86,7 @@ def build(
         if geom.name in {site.name for site in spec.sites}:
             geom.friction = [mu, 0.02, 0.01]
             if geom.name in adhesive:
-                motor = spec.add_actuator(
-                    name=f"adhesion_{geom.name}", target=geom.parent.name, trntype=mujoco.mjtTrn.mjTRN_BODY
-                )
+                motor = spec.add_actuator(name=f"adhesion_{geom.name}", target=geom.parent.name, trntype=mujoco.mjtTrn.mjTRN_BODY)
                 motor.set_to_adhesion(adhesion)
                 motor.ctrllimited = True
                 motor.ctrlrange = [0, 1]

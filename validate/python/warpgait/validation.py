@@ -103,10 +103,8 @@ def _adhesion(plan: Plan) -> tuple[Array, Array, float]:
     return pull, pull * ADHESION_RESERVE, limit * ADHESION_RESERVE
 
 
-def validate(
-    plan: Plan, settings: Settings | None = None, on_step: Callable[[float, Any], None] | None = None, say: Callable[[str], None] = lambda _: None
-) -> Validation:
-    """Judge `plan` on its full robot. `on_step(t, data)` sees the counted whole-body replay, for films; `say` gets progress."""
+def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], None] = lambda _: None) -> Validation:
+    """Judge `plan` on its full robot; `say` gets one line a stage."""
     started = time.perf_counter()
     settings = settings or Settings()
     check_mujoco()
@@ -142,10 +140,9 @@ def validate(
         joints = analysis.qpos[:, index.qpos]
         todo.append(("second opinion: joint PD", False, world, fine, JointPD(own, index, fine, plan.t, joints)))
     trials = []
-    for number, (name, counts, model, reference, controller) in enumerate(todo):
+    for name, counts, model, reference, controller in todo:
         say(name)
-        watcher = on_step if number == 0 else None
-        replay = run(model, own, world_index, reference, controller, analysis.qpos[0], settings.disturbance, watcher)
+        replay = run(model, own, world_index, reference, controller, analysis.qpos[0], settings.disturbance)
         trials.append(Trial(name, counts, reference, replay, *closed_loop(plan, replay, reference, index, name)))
     notes = _notes(plan, own, path, index)
     seconds = time.perf_counter() - started
