@@ -29,6 +29,17 @@ def rotation_error(R: Array) -> Array:
     return result
 
 
+def friction_cones(normal: Array, friction: float) -> Array:
+    """Rows (..., EDGES + 1, 3) for normals (..., 3): ν cos(π/EDGES) n − s for directions s around n, then n itself; all ≥ 0 inside."""
+    tx = np.cross([0.0, 1.0, 0.0], normal)
+    tx /= np.linalg.norm(tx, axis=-1, keepdims=True)
+    ty = np.cross(normal, tx)
+    angles = 2 * np.pi * np.arange(EDGES)[:, None] / EDGES
+    around = np.cos(angles) * tx[..., None, :] + np.sin(angles) * ty[..., None, :]
+    inner = friction * np.cos(np.pi / EDGES) * normal[..., None, :]
+    return np.concatenate([inner - around, normal[..., None, :]], axis=-2)
+
+
 @dataclass(frozen=True)
 class Gains:
     """Feedback gains (stiffness 1/s², damping 1/s) and task weights."""
@@ -86,17 +97,8 @@ class WholeBody:
         self._A[3:6, 3:6] = np.eye(3)
         self._contact_jacobian = np.zeros((E, 3, nv))
         self._jacobian_rate = np.zeros((3, nv))
-        angles = 2 * np.pi * np.arange(EDGES) / EDGES
-        self._edges = np.stack([np.cos(angles), np.sin(angles)], 1)
+        self._cones = friction_cones(reference.normal, friction)
         self._last = np.zeros((E, 3))
-
-    def _cone(self, normal: Array) -> Array:
-        """Rows (EDGES + 1, 3): ν cos(π/EDGES) n − s for directions s around n, then n itself."""
-        tx = np.cross([0.0, 1.0, 0.0], normal)
-        tx /= np.linalg.norm(tx)
-        ty = np.cross(normal, tx)
-        inner = self.friction * np.cos(np.pi / EDGES)
-        return np.vstack([inner * normal - self._edges @ np.stack([tx, ty]), normal])
 
     def _tasks(self, k: int, data: Any, touching: Bools, bias: Array) -> Array:
         """Fill A q̈ = b for all tasks and return the rows' weights."""
@@ -161,7 +163,7 @@ class WholeBody:
         lower[6 : 6 + m], upper[6 : 6 + m] = -limit - bias[motors], limit - bias[motors]
         for j, e in enumerate(stance):
             first = 6 + m + rows * j
-            C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cone(ref.normal[k, e])
+            C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cones[k, e]
             lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
             lower[first + EDGES] = -self.pull[e] if self.pull[e] > 0 else g.least_normal_force
         sense = np.zeros(len(C), np.int32)

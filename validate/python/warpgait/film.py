@@ -149,7 +149,7 @@ def _arrows(scene: Any, points: npt.NDArray[np.float64], forces: npt.NDArray[np.
         if np.linalg.norm(force) > 0.01 and scene.ngeom < scene.maxgeom:
             geom = scene.geoms[scene.ngeom]
             mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), np.zeros(9), color)
-            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.012, point, point + 0.8 * force)
+            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.02, point, point + 0.8 * force)
             scene.ngeom += 1
 
 

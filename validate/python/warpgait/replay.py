@@ -72,19 +72,16 @@ class _Feet:
         geom, row = data.contact.geom, data.contact.efc_address
         other = np.where(geom[:, 0] == self.ground, geom[:, 1], geom[:, 0])
         foot = self.foot_of_geom[other]
-        active = (foot >= 0) & (row >= 0)
-        sign = np.where(geom[:, 0] == self.ground, 1.0, -1.0)  # MuJoCo's force acts on the second geom
-        frame = data.contact.frame.reshape(-1, 3, 3)
-        on_normal = np.zeros((E, 3))
-        for c in np.flatnonzero(active):
-            e = foot[c]
-            force[e] += sign[c] * (data.efc_force[row[c] : row[c] + 3] @ frame[c])
-            on_normal[e] += sign[c] * frame[c, 0]
-            touching[e] = True
+        active = np.flatnonzero((foot >= 0) & (row >= 0))
+        sign = np.where(geom[active, 0] == self.ground, 1.0, -1.0)[:, None]  # MuJoCo's force acts on the second geom
+        frame = data.contact.frame[active].reshape(-1, 3, 3)
+        local = data.efc_force[row[active, None] + np.arange(3)]  # normal, two tangents: elliptic cones
+        np.add.at(force, foot[active], sign * (local[:, None] @ frame)[:, 0])
+        touching[foot[active]] = True
         for e, actuator in self.adhesion:
             if touching[e]:  # the actuator presses the foot on; the ground's net force is what remains
-                normal = on_normal[e] / np.linalg.norm(on_normal[e])
-                force[e] -= data.actuator_force[actuator] * normal
+                normal = (sign * frame[:, 0])[foot[active] == e].sum(0)
+                force[e] -= data.actuator_force[actuator] * normal / np.linalg.norm(normal)
         return force, touching, [int(g) for g in other[foot < 0]]
 
 

@@ -79,6 +79,15 @@ def build(
         conaffinity=1,
         rgba=[0.55, 0.5, 0.42, 1.0],
     )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.72, 0.82, 0.92],
+        rgb2=[0.95, 0.96, 0.98],
+        width=64,
+        height=64,
+    )
     base = spec.body("base")
     base.mass *= disturbance.mass_factor
     base.fullinertia = np.asarray(base.fullinertia) * disturbance.mass_factor
