@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-import crawl
 import pytest
+
+import crawl
 
 
 @pytest.fixture(scope="session")

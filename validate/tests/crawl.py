@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
+
 from warpgait.model import Composite, composite, find_model, foot_names, indices, load_spec, stand
 from warpgait.plan import Array
 
@@ -100,10 +101,11 @@ def make(
     adhesive: tuple[str, ...] = (),
     shift: float = 0.75,
     swing: float = 0.40,
+    tilt: float = 0.0,
     extent: tuple[float, float, float, float] = (-1.5, 2.0, -1.2, 1.2),
     spacing: float = 0.025,
 ) -> Path:
-    """Write a plan of `steps` single steps (0: standing for 1 s) along x and return its path."""
+    """Write a plan of `steps` single steps (0: standing for 1 s) along x and return its path; the trunk is pitched up by `tilt` rad."""
     body, nominal, feet = body_of(robot)
     E = len(feet)
     order = [feet.index(f) for f in ("RH", "RF", "LH", "LF")]
@@ -112,7 +114,9 @@ def make(
     N = round(duration * RATE) + 1
     t = np.arange(N) / RATE
 
-    holds = nominal.copy()
+    up = Rotation.from_rotvec([0.0, -tilt, 0.0])
+    above = up.apply([0.0, 0.0, -nominal[:, 2].mean()])  # the centre of mass, from the feet's mean
+    holds = up.apply(nominal) + above
     holds[:, 2] = [height(p[0], p[1]) for p in holds]
     foot, contact = np.repeat(holds[None], N, 0), np.ones((N, E), bool)
     ends = np.full((N, E, 2), [-1.0, duration + 1.0])  # of the running stance
@@ -145,9 +149,9 @@ def make(
     for (t0, a), (t1, b) in itertools.pairwise(waypoints):
         inside = (t >= t0 - 1e-9) & (t <= t1 + 1e-9)
         com[inside] = a + (b - a) * smooth_step(((t[inside] - t0) / max(t1 - t0, 1e-9))[:, None])
-    com[:, 2] += -nominal[:, 2].mean()
+    com += above
     angle = 0.03 * smooth_step(t / duration)  # a little pitch, so that the orientation is put to use
-    rotation = Rotation.from_rotvec(angle[:, None] * [0.0, 1.0, 0.0])
+    rotation = Rotation.from_rotvec(angle[:, None] * [0.0, 1.0, 0.0]) * up
 
     def derivatives(values: Array) -> tuple[Array, Array]:
         spline = CubicSpline(t, values, bc_type="clamped")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from crawl import altered
 from warpgait.metrics import Verdict
 from warpgait.plan import load

@@ -125,9 +125,10 @@ def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
     arrays: dict[str, npt.NDArray[Any]] = {}
     member = ""
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not hasattr(archive, "files"):
-                raise InputError(f"{path}: a single NumPy array, not a plan (an .npz archive)")
+        archive = np.load(path, allow_pickle=False)
+        if not hasattr(archive, "files"):
+            raise InputError(f"{path}: a single NumPy array, not a plan (an .npz archive)")
+        with archive:
             for member in archive.files:
                 arrays[member] = archive[member]
     except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:

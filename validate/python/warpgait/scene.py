@@ -96,7 +96,8 @@ def build(
             geom.friction = [mu, 0.02, 0.01]
             if geom.name in adhesive:
                 motor = spec.add_actuator(name=f"adhesion_{geom.name}", target=geom.parent.name, trntype=mujoco.mjtTrn.mjTRN_BODY)
-                motor.set_to_adhesion(adhesion)
                 motor.ctrllimited = True
                 motor.ctrlrange = [0, 1]
+                motor.forcelimited = False  # the model's default is the joint motors' limit
+                motor.set_to_adhesion(adhesion)
     return spec.compile()
