@@ -59,6 +59,7 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
     assert main([str(standing_plan), "--friction", "-1"]) == 2
     assert main([str(standing_plan), "--rate", "333"]) == 2
+    assert main([str(standing_plan), "--push", "0,nan,0,0,0"]) == 2
 
 
 def test_without_a_display_or_opengl_the_report_says_what_to_install(

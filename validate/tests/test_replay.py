@@ -78,6 +78,17 @@ def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan
     assert first is not None and 0.4 < first.time < 1.0
 
 
+def test_a_simulation_that_blows_up_is_a_failure_not_a_crash(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    disturbance = Disturbance(push=(0.4, 0.1, 0.0, 1e12, 0.0))
+    found = validate(load(standing_plan), Settings(disturbance=disturbance))
+    assert found.verdict is Verdict.FAIL
+    assert found.first_failure is not None and "blew up" in found.first_failure.what
+    assert list(tmp_path.iterdir()) == []  # MuJoCo would leave a log file here
+
+
 def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
     """The raw heightfield is replayed too, and counts."""
     plan = load(standing_plan)

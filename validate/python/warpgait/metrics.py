@@ -91,6 +91,13 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
         Metric(layer, "peak joint speed", float(speed.max()), "of limit", 0.9, 1.0),
     ]
     incidents = []
+    force, torque = np.linalg.norm(result.plan_residual[:, :3], axis=1), np.linalg.norm(result.plan_residual[:, 3:], axis=1)
+    for metric, course, scale, what in (
+        (metrics[2], force, mg, "the planned forces do not explain the motion of the centre of mass"),
+        (metrics[3], torque, mg * LEVER, "the planned forces do not explain the rotation"),
+    ):
+        if metric.verdict is not Verdict.PASS:
+            incidents.append(Incident(float(plan.t[np.argmax(100 * course / scale > metric.passes)]), f"open loop: {what}"))
     for flags, what in (
         (result.unreachable, "out of reach"),
         (result.beyond_limits, "a joint past its limit"),
@@ -176,8 +183,14 @@ def closed_loop(
         at = _first(flags)
         if at:
             incidents.append(Incident(float(replay.t[at[0]]), f"{layer}: {what}", index.feet[at[1]]))
-    if com.max() > 0.1:
-        incidents.append(Incident(float(replay.t[np.argmax(com > 0.1)]), f"{layer}: centre of mass 0.1 m off"))
+    net = np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
+    for course, limit, what in (
+        (com, 0.1, "centre of mass 0.1 m off"),
+        (turn, 8.0, "the trunk is turned by 8° from the plan"),
+        (net, 0.15, "the feet's net force is off by 15 % of m g"),
+    ):
+        if course.max() > limit:
+            incidents.append(Incident(float(replay.t[np.argmax(course > limit)]), f"{layer}: {what}"))
     return metrics, incidents
 
 

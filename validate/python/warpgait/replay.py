@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,6 +116,18 @@ class _Measurement:
         return contact
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """MuJoCo prints its warnings and writes them to a file in the working directory; the replay reports them itself."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+@_quiet()
 def run(
     world: Any,
     own_model: Any,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -75,6 +76,10 @@ def arguments() -> argparse.ArgumentParser:
 
 
 def _refuse_nonsense(options: argparse.Namespace) -> None:
+    for name, value in vars(options).items():
+        numbers = value if isinstance(value, tuple) else (value,)
+        if any(isinstance(v, float) and not math.isfinite(v) for v in numbers):
+            raise InputError(f"--{name.replace('_', '-')}: every number must be finite")
     if options.friction is not None and not 0 < options.friction <= 10:
         raise InputError(f"--friction {options.friction:g}: must be in (0, 10]")
     if not 0.1 <= options.mass_factor <= 10:

@@ -76,7 +76,9 @@ class Validation:
 
     @property
     def first_failure(self) -> Incident | None:
-        """The earliest incident; at the same time, the open loop's, which needs no simulation to be true."""
+        """The earliest incident, of a plan that does not pass; at the same time, the open loop's, which needs no simulation to be true."""
+        if self.verdict is Verdict.PASS:
+            return None
         found = self.incidents + [i for t in self.trials if t.counts for i in t.incidents]
         return min(found, key=lambda i: i.time, default=None)
 
