@@ -34,11 +34,11 @@ def check_mujoco() -> None:
 
 
 def robots_directories() -> list[Path]:
-    """Where models are looked for, first match first: $WARPGAIT_ROBOTS, then `robots` above this file, then above the working directory."""
+    """Where models are looked for: $WARPGAIT_ROBOTS, `models` in an installed package, `robots` above this file or the working folder."""
     named = [Path(p) for p in os.environ.get("WARPGAIT_ROBOTS", "").split(os.pathsep) if p]
     here = Path(__file__).resolve()
     above = [p / "robots" for p in (*here.parents[:4], Path.cwd(), *Path.cwd().parents)]
-    return [*named, *(p for p in above if p.is_dir())]
+    return [*named, *(p for p in (here.parent / "models", *above) if p.is_dir())]
 
 
 def available_models() -> list[str]:

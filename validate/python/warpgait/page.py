@@ -66,7 +66,7 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
     for j, joint in enumerate(("HAA", "HFE", "KFE")):
         limit = float(v.index.torque_limit[:, j].max())
         lines = [Line(t, r.torque[:, e, j], "actual") for e in range(len(v.index.feet))]
-        lines += [Line(v.plan.t, v.analysis.torque[:, e, j], "planned faint") for e in range(len(v.index.feet))]
+        lines += [Line(v.plan.t[2:-2], v.analysis.torque[2:-2, e, j], "planned faint") for e in range(len(v.index.feet))]
         parts.append(chart(f"Torque {joint}, all legs (blue: open loop)", "N m", lines, (-limit, limit), end))
     return parts
 
@@ -111,7 +111,7 @@ def render(v: Validation, pictures: list[tuple[float, bytes]], picture_note: str
                 for i in sorted(trial.incidents, key=lambda i: i.time)
             )
             parts.append(f"<ul>{items}</ul>")
-    parts.append("<h2>The whole-body replay in time</h2>")
+    parts.append("<h2>The whole-body replay over time, s</h2>")
     parts += _plots(v, v.trials[0])
     return "\n".join(parts) + "</html>\n"
 

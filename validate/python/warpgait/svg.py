@@ -28,7 +28,7 @@ def _ticks(low: float, high: float, count: int = 4) -> list[float]:
     raw = (high - low) / count
     step = 10.0 ** np.floor(np.log10(raw))
     step *= next(f for f in (1, 2, 5, 10) if f * step >= raw * 0.999)
-    return [float(v) for v in np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step]
+    return [float(v) + 0.0 for v in np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step]
 
 
 def _path(line: Line, sx: tuple[float, float], sy: tuple[float, float], points: int = 600) -> str:
