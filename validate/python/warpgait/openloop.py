@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from .kinematics import legs
 from .model import Indices
 from .plan import Array, Bools, Plan
+from .rolling import Rolling, none, roll
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class OpenLoop:
 
     qpos: Array  # (N, nq) MuJoCo's positions
     qvel: Array  # (N, nv)
+    rolling: Rolling  # of the feet in these postures
     unreachable: Bools  # (N, E) no joint angles put the foot there
     beyond_limits: Bools  # (N, E) only with a joint past its limit
     plan_residual: Array  # (N, 6) force N and torque about the centre of mass N m that the centroidal plan leaves unexplained
@@ -27,18 +29,29 @@ class OpenLoop:
     torque: Array  # (N, E, 3) N m
 
 
-def postures(plan: Plan, model: Any, index: Indices) -> tuple[Array, Bools, Bools]:
-    """Joint positions (N, nq) that put centre of mass, trunk orientation and feet where the plan has them; what cannot be reached.
+@dataclass(frozen=True)
+class Postures:
+    """Inverse kinematics along the plan."""
+
+    qpos: Array  # (N, nq)
+    unreachable: Bools  # (N, E)
+    beyond_limits: Bools  # (N, E)
+    shank: Array  # (N, E, 3, 3) orientations of the bodies that carry the feet, body to world
+
+
+def postures(plan: Plan, model: Any, index: Indices, rolling: Rolling) -> Postures:
+    """Joint positions that put centre of mass, trunk orientation and feet where the plan has them; what cannot be reached.
 
     The base's origin lies off the centre of mass by an amount that depends on the legs: three fixed-point steps find it.
     """
     data = mujoco.MjData(model)
     N, E = plan.foot_contact.shape
     R = Rotation.from_quat(plan.base_quaternion_wxyz[:, [1, 2, 3, 0]]).as_matrix()
-    centers = plan.foot_position + index.radius * plan.foot_normal
+    centers = plan.foot_position + index.radius * plan.foot_normal + rolling.offset
     qpos = np.zeros((N, model.nq))
     qpos[:, 3:7] = plan.base_quaternion_wxyz
     unreachable, beyond = np.zeros((N, E), bool), np.zeros((N, E), bool)
+    shank = np.zeros((N, E, 3, 3))
     mujoco.mj_resetDataKeyframe(model, data, model.key("stand").id)
     mujoco.mj_forward(model, data)
     offset = np.tile(data.subtree_com[index.base] - data.xpos[index.base], (N, 1))
@@ -55,7 +68,8 @@ def postures(plan: Plan, model: Any, index: Indices) -> tuple[Array, Bools, Bool
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             offset[k] = R[k].T @ (data.subtree_com[index.base] - data.xpos[index.base])
-    return qpos, unreachable, beyond
+            shank[k] = data.xmat[index.body].reshape(E, 3, 3)
+    return Postures(qpos, unreachable, beyond, shank)
 
 
 def centroidal_residual(plan: Plan) -> Array:
@@ -81,7 +95,10 @@ def centroidal_residual(plan: Plan) -> Array:
 
 def analyse(plan: Plan, model: Any, index: Indices) -> OpenLoop:
     """Inverse kinematics and inverse dynamics along the plan. `model` needs no terrain; contacts are switched off."""
-    qpos, unreachable, beyond = postures(plan, model, index)
+    found = postures(plan, model, index, none(plan))
+    rolling = roll(plan, found.shank, index.radius)
+    found = postures(plan, model, index, rolling)
+    qpos = found.qpos
     data = mujoco.MjData(model)
     N, step = len(plan.t), plan.t[1]
     qvel, qacc = np.zeros((N, model.nv)), np.zeros((N, model.nv))
@@ -107,4 +124,4 @@ def analyse(plan: Plan, model: Any, index: Indices) -> OpenLoop:
         residual[k] = np.r_[force, moment]
         torque[k] = generalized[index.qvel]
     model.opt.disableflags = flags
-    return OpenLoop(qpos, qvel, unreachable, beyond, centroidal_residual(plan), residual, torque)
+    return OpenLoop(qpos, qvel, rolling, found.unreachable, found.beyond_limits, centroidal_residual(plan), residual, torque)

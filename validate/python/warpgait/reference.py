@@ -9,6 +9,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
 from .plan import Array, Bools, Plan
+from .rolling import Rolling, none
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,13 @@ class Reference:
     contact: Bools  # (K, E)
 
 
-def sample(plan: Plan, rate: float, foot_radius: float) -> Reference:
-    """Evaluate `plan` at `rate` Hz from 0 to its end.
+def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None = None) -> Reference:
+    """Evaluate `plan` at `rate` Hz from 0 to its end; `rolling` moves the feet's centres.
 
     Positions by cubic Hermite interpolation of the plan's samples and velocities, orientation by spherical interpolation,
     all else linearly; contact is that of the sample before. A force counts only while its foot is in contact.
     """
+    rolling = rolling or none(plan)
     t = np.arange(round(plan.duration * rate) + 1) / rate
     t = np.minimum(t, plan.duration)
     before = np.clip(np.floor(t / plan.t[1] + 1e-6).astype(int), 0, len(plan.t) - 1)
@@ -59,9 +61,11 @@ def sample(plan: Plan, rate: float, foot_radius: float) -> Reference:
         rotation=rotation,
         angular_velocity=linear(plan.base_angular_velocity),
         angular_acceleration=linear(plan.base_angular_acceleration),
-        foot=CubicHermiteSpline(plan.t, plan.foot_position, plan.foot_velocity)(t) + foot_radius * normal,
-        foot_velocity=linear(plan.foot_velocity + foot_radius * turning),
-        foot_acceleration=linear(plan.foot_acceleration),
+        foot=CubicHermiteSpline(plan.t, plan.foot_position, plan.foot_velocity)(t)
+        + foot_radius * normal
+        + linear(rolling.offset),
+        foot_velocity=linear(plan.foot_velocity + foot_radius * turning + rolling.velocity),
+        foot_acceleration=linear(plan.foot_acceleration + rolling.acceleration),
         normal=normal,
         force=linear(plan.foot_force) * contact[..., None],
         contact=contact,

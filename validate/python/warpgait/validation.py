@@ -128,7 +128,8 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     def world_on(terrain: Heightfield) -> Any:
         return build(path, terrain, plan.robot.friction, plan.robot.gravity, adhesive, strength, settings.disturbance)
 
-    fine, coarse = sample(plan, PD_RATE, index.radius), sample(plan, settings.rate, index.radius)
+    fine = sample(plan, PD_RATE, index.radius, analysis.rolling)
+    coarse = sample(plan, settings.rate, index.radius, analysis.rolling)
 
     def whole_body() -> WholeBody:
         return WholeBody(own, index, coarse, plan.robot.friction, pull, preload)
