@@ -8,6 +8,7 @@ would have to slide. So the reference rolls: around the planned contact point, w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -34,7 +35,7 @@ def runs(plan: Plan, foot: int) -> list[tuple[bool, int, int]]:
     """Alternating stances and swings of a foot: (stance, first sample, one past the last)."""
     contact = plan.foot_contact[:, foot]
     edges = [0, *(np.flatnonzero(np.diff(contact)) + 1).tolist(), len(contact)]
-    return [(bool(contact[a]), a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(bool(contact[a]), a, b) for a, b in pairwise(edges)]
 
 
 def roll(plan: Plan, shank: Array, radius: float) -> Rolling:
