@@ -2,15 +2,20 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use warpgait::heightfield::Heightfield;
 use warpgait::scenario::MapSpec;
 use warpgait::warp::{Order, WarpMap};
 
 fn evaluation(criterion: &mut Criterion) {
     let height = |x: f64, y: f64| 0.15 * (2.6 * x).sin() * (2.6 * y).sin();
-    let map = WarpMap::shear_of([-3.0, 3.0, -3.0, 3.0], &MapSpec::default(), height).expect("a valid map");
+    let field = Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.02, |x, y| Ok(height(x, y)))
+        .expect("a valid terrain");
+    let map = WarpMap::shear(&field, &MapSpec::default()).expect("a valid map");
     // Points along a line, as a motion visits them.
-    let points: Vec<[f64; 3]> =
-        (0..256).map(|i| f64::from(i) / 256.0).map(|t| [4.0 * t - 2.0, 3.0 * t - 1.5, 0.5 * t]).collect();
+    let points: Vec<[f64; 3]> = (0..256)
+        .map(|i| f64::from(i) / 256.0)
+        .map(|t| [4.0 * t - 2.0, 3.0 * t - 1.5, 0.5 * t])
+        .collect();
     let mut at = 0;
     let mut next = move || {
         at = (at + 1) % points.len();
@@ -18,9 +23,13 @@ fn evaluation(criterion: &mut Criterion) {
     };
     criterion.bench_function("position", |b| b.iter(|| map.position(black_box(next()))));
     for order in [Order::First, Order::Second, Order::Third] {
-        criterion.bench_function(&format!("jet {order:?}"), |b| b.iter(|| map.jet(black_box(next()), order)));
+        criterion.bench_function(&format!("jet {order:?}"), |b| {
+            b.iter(|| map.jet(black_box(next()), order))
+        });
     }
-    criterion.bench_function("inverse", |b| b.iter(|| map.inverse(map.position(black_box(next())))));
+    criterion.bench_function("inverse", |b| {
+        b.iter(|| map.inverse(map.position(black_box(next()))))
+    });
 }
 
 criterion_group!(benches, evaluation);

@@ -14,7 +14,7 @@
 //! - A panic in the problem stops the solve and goes on in the caller once Ipopt has cleaned up.
 //! - Ctrl-C, once [`install_ctrl_c`] was called, stops the solve at the next iteration; see [`INTERRUPT`].
 //!
-//! This module is the only place in the crate with `unsafe` code, in `application` and `callbacks`.
+//! This module is the only place in the crate with `unsafe` code: in `application`, `callbacks` and one call in `solve`.
 
 use std::ops::ControlFlow;
 

@@ -24,8 +24,8 @@ pub struct IterationRecord {
     pub mode: Mode,
     /// f, unscaled.
     pub objective: f64,
-    /// How far g lies outside its bounds: max norm, unscaled, at the last point at which g was evaluated, which is
-    /// the current iterate. (Ipopt's own `inf_pr` is scaled and counts the slack variables.)
+    /// How far g lies outside its bounds at the current iterate: max norm, unscaled. (Ipopt's own `inf_pr` is scaled
+    /// and counts the slack variables.)
     pub violation: f64,
     /// Max norm of the gradient of the Lagrangian, scaled; in the restoration phase, that of its own problem.
     pub dual_infeasibility: f64,
@@ -59,7 +59,8 @@ pub struct Multipliers {
 /// The result of a solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
-    /// (n,) the final point; after a stop by the callback or an interruption, the one that the callback saw last.
+    /// (n,) the final point; after a stop by the callback or an interruption, the one that the callback saw last, which
+    /// may lie outside its bounds by Ipopt's `bound_relax_factor` (1e-8).
     pub x: Vec<f64>,
     /// f(x); NaN if Ipopt ended before it knew.
     pub objective: f64,

@@ -14,7 +14,7 @@ use crate::plan::Seconds;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Law, Scenario};
 use crate::trajectory::space::Space;
-use crate::warp::WarpMap;
+use crate::warp::{self, WarpMap};
 use crate::{Error, Result};
 
 /// `effort = "smooth"` stops when this many iterations have lowered a feasible objective by less than `SMOOTH_GAIN` of it.
@@ -315,7 +315,8 @@ fn scaled(ground: &Heightfield, share: f64) -> Result<Heightfield> {
 }
 
 fn map_of(ground: &Heightfield, scenario: &Scenario) -> Result<WarpMap> {
-    WarpMap::shear_of(ground.extent(), &scenario.map, |x, y| ground.height(x, y))
+    let mut go_on = |_: warp::MapProgress| ControlFlow::Continue(());
+    Ok(warp::build_cached(ground, &scenario.map, warp::default_cache_dir().as_deref(), &mut go_on)?.0)
 }
 
 /// Adaptive μ (monotone takes ten times the iterations) and MUMPS with the QAMD ordering (1.6 times faster than its default).

@@ -1,12 +1,25 @@
 //! The warp φ: F → A, a tri-cubic B-spline whose bottom face is the terrain.
 
+mod assembly;
 mod axis;
 mod basis;
 mod bottom;
+mod build;
+mod cache;
+mod density;
 mod inverse;
+mod lanes;
+mod lbfgs;
+mod preconditioner;
+mod problem;
+mod refine;
+mod report;
 mod shear;
 mod spline;
 
+pub use build::{MapProgress, build};
+pub use cache::{build_cached, default_cache_dir};
+pub use report::{Distribution, MapReport};
 pub use spline::{Order, WarpMap};
 
 /// φ and its derivatives at one point of F.

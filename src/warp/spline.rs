@@ -50,6 +50,25 @@ impl WarpMap {
         Ok(WarpMap { cells, origin, cell, control_points })
     }
 
+    /// A map from its parts; (Nx+3)(Ny+3)(Nz+3) control points.
+    pub(super) fn new(
+        cells: [usize; 3],
+        origin: [f64; 3],
+        cell: [f64; 3],
+        control_points: Vec<[f64; 3]>,
+    ) -> WarpMap {
+        debug_assert_eq!(
+            control_points.len(),
+            cells.iter().map(|n| n + 3).product::<usize>()
+        );
+        WarpMap {
+            cells,
+            origin,
+            cell,
+            control_points,
+        }
+    }
+
     /// Cells along x, y, z.
     pub fn cells(&self) -> [usize; 3] {
         self.cells

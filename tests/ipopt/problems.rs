@@ -226,3 +226,101 @@ impl NlpProblem for Unconstrained {
         assert!(out.is_empty());
     }
 }
+
+/// minimise Σᵢ (sin(i + 3xᵢ) + (xᵢ − aᵢ)²/5) subject to xᵢ xᵢ₊₁ + sin(2xᵢ) = bᵢ for i < n/2 and |xᵢ| ≤ 4, where a and b
+/// are pseudo-random: not convex, and not always feasible.
+///
+/// Counts how often `new_x` was false although x was not the one of the call before.
+pub struct Wavy {
+    targets: Vec<f64>,
+    right_sides: Vec<f64>,
+    rows: Vec<i32>,
+    columns: Vec<i32>,
+    last_x: Vec<f64>,
+    pub false_new_x: usize,
+}
+
+impl Wavy {
+    pub fn new(n: usize, seed: u64) -> Self {
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut random = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            4.0 * (state >> 11) as f64 / (1u64 << 53) as f64 - 2.0
+        };
+        let rows = (0..n as i32 / 2).flat_map(|row| [row, row]).collect();
+        let columns = (0..n as i32 / 2).flat_map(|row| [row, row + 1]).collect();
+        Self {
+            targets: (0..n).map(|_| random()).collect(),
+            right_sides: (0..n / 2).map(|_| random()).collect(),
+            rows,
+            columns,
+            last_x: vec![f64::NAN; n],
+            false_new_x: 0,
+        }
+    }
+
+    fn see(&mut self, x: &[f64], new_x: bool) {
+        if !new_x && self.last_x != x {
+            self.false_new_x += 1;
+        }
+        self.last_x.copy_from_slice(x);
+    }
+}
+
+impl NlpProblem for Wavy {
+    fn num_variables(&self) -> usize {
+        self.targets.len()
+    }
+
+    fn num_constraints(&self) -> usize {
+        self.right_sides.len()
+    }
+
+    fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        lower.fill(-4.0);
+        upper.fill(4.0);
+    }
+
+    fn constraint_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        lower.copy_from_slice(&self.right_sides);
+        upper.copy_from_slice(&self.right_sides);
+    }
+
+    fn initial_point(&self, x: &mut [f64]) {
+        x.copy_from_slice(&self.targets);
+    }
+
+    fn objective(&mut self, x: &[f64], new_x: bool) -> f64 {
+        self.see(x, new_x);
+        let term = |(i, (x, a)): (usize, (&f64, &f64))| (i as f64 + 3.0 * x).sin() + (x - a).powi(2) / 5.0;
+        x.iter().zip(&self.targets).enumerate().map(term).sum()
+    }
+
+    fn gradient(&mut self, x: &[f64], new_x: bool, out: &mut [f64]) {
+        self.see(x, new_x);
+        for i in 0..x.len() {
+            out[i] = 3.0 * (i as f64 + 3.0 * x[i]).cos() + 0.4 * (x[i] - self.targets[i]);
+        }
+    }
+
+    fn constraints(&mut self, x: &[f64], new_x: bool, out: &mut [f64]) {
+        self.see(x, new_x);
+        for i in 0..out.len() {
+            out[i] = x[i] * x[i + 1] + (2.0 * x[i]).sin();
+        }
+    }
+
+    fn jacobian_structure(&self) -> (&[i32], &[i32]) {
+        (&self.rows, &self.columns)
+    }
+
+    fn jacobian_values(&mut self, x: &[f64], new_x: bool, out: &mut [f64]) {
+        self.see(x, new_x);
+        for i in 0..x.len() / 2 {
+            out[2 * i] = x[i + 1] + 2.0 * (2.0 * x[i]).cos();
+            out[2 * i + 1] = x[i];
+        }
+    }
+}

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use warpgait::ipopt::{IterationRecord, Mode, NlpProblem, Options, Solution, Status, solve};
 
-use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, go_on, run};
+use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, Wavy, go_on, run};
 
 #[track_caller]
 fn assert_is_hs071(solution: &Solution) {
@@ -209,4 +209,28 @@ fn limits_are_reported() {
     });
     let solution = run(&mut problem, &Options::new().set_num("max_cpu_time", 0.02)).unwrap();
     assert_eq!(solution.status, Status::MaxCpuTime);
+}
+
+/// On problems with long line searches and restorations too: the point shown is the current iterate, and `new_x` is
+/// never false for an x that the problem has not seen.
+#[test]
+fn rough_problems_see_the_right_points() {
+    let (mut iterations, mut restorations, mut solved) = (0, 0, 0);
+    for seed in 0..20 {
+        let strategy = if seed % 2 == 0 { "adaptive" } else { "monotone" };
+        let options = Options::new().set_str("mu_strategy", strategy).set_int("max_iter", 100);
+        let (mut problem, mut check) = (Wavy::new(20, seed), Wavy::new(20, seed));
+        let solution = solve(&mut problem, &options, None, &mut |record, x| {
+            let objective = check.objective(x, true);
+            assert!((objective - record.objective).abs() < 1e-8 * (1.0 + objective.abs()));
+            iterations += 1;
+            restorations += usize::from(record.mode == Mode::Restoration);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        solved += usize::from(solution.status.converged());
+        assert_eq!(problem.false_new_x, 0);
+    }
+    println!("{iterations} iterations, {restorations} of them restoration, {solved} of 20 solved");
+    assert!(restorations > 20 && solved > 0);
 }

@@ -1,0 +1,189 @@
+//! From a terrain to its map: coarse grids first, each the start of the next finer one.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use super::WarpMap;
+use super::axis::Rule;
+use super::density::Mips;
+use super::lbfgs::{Limits, Outcome, minimize};
+use super::problem::Problem;
+use super::report::MapReport;
+use crate::heightfield::Heightfield;
+use crate::scenario::{MapMethod, MapSpec};
+use crate::{Error, Result};
+
+/// Where the optimizer stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapProgress {
+    /// Cells of the grid at work.
+    pub cells: [usize; 3],
+    /// Iteration on this grid.
+    pub iteration: usize,
+    /// The energy, m³.
+    pub energy: f64,
+    /// gᵀHg over the energy, which falls to `tolerance`.
+    pub decrement: f64,
+    /// Where this grid is done.
+    pub tolerance: f64,
+}
+
+/// On all grids: gᵀHg relative to the energy.
+const TOLERANCE: f64 = 1e-4;
+const MAX_ITERATIONS: usize = 400;
+/// The coarsest grid has at least this many cells along each axis, where the numbers can be halved at all.
+const COARSEST: usize = 8;
+
+/// Finds the map over a terrain by the method of `spec`. F's box stands over the terrain's rectangle.
+///
+/// `progress` is called once an iteration and may stop the work.
+///
+/// # Errors
+/// For a grid that makes no sense, a method that is not available, and when `progress` says to stop. A map that is folded
+/// or did not converge is not an error: its report says so.
+pub fn build(
+    field: &Heightfield,
+    spec: &MapSpec,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<(WarpMap, MapReport)> {
+    let start = Instant::now();
+    match spec.method {
+        MapMethod::Shear => {
+            let map = WarpMap::shear(field, spec)?;
+            let mut report = MapReport::measure(&map, field, spec.method);
+            report.seconds = start.elapsed().as_secs_f64();
+            Ok((map, report))
+        }
+        MapMethod::Mips => mips(field, spec, progress, start),
+        other => Err(Error::input(format!(
+            "map.method = {} is not available yet; available are \"mips\" and \"shear\"",
+            serde_json::to_string(&other).unwrap_or_default()
+        ))),
+    }
+}
+
+fn mips(
+    field: &Heightfield,
+    spec: &MapSpec,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+    start: Instant,
+) -> Result<(WarpMap, MapReport)> {
+    let mut run = Run {
+        field,
+        progress,
+        outcome: Outcome::default(),
+        notes: Vec::new(),
+    };
+    let map = run.coarse_to_fine(spec, Rule::Lobatto)?;
+    let mut report = MapReport::measure(&map, field, spec.method);
+    let mut best = (map, run.outcome);
+    if !best.1.converged || report.inverted_points > 0 {
+        // More points a cell leave no room for folds between them; from the shear there are none to begin with.
+        let reason = if report.inverted_points > 0 {
+            "was folded between its quadrature points"
+        } else {
+            "did not converge"
+        };
+        run.notes.push(format!(
+            "the first map {reason}; it was built again with four Gauss points a cell and axis"
+        ));
+        let map = run.coarse_to_fine(spec, Rule::Gauss)?;
+        let second = MapReport::measure(&map, field, spec.method);
+        if (second.inverted_points, !run.outcome.converged)
+            < (report.inverted_points, !best.1.converged)
+        {
+            report = second;
+            best = (map, run.outcome);
+        }
+    }
+    report.converged = best.1.converged;
+    report.energy = best.1.value;
+    report.iterations = run.outcome.iterations;
+    report.evaluations = run.outcome.evaluations;
+    if !report.converged {
+        report.warnings.push(format!(
+            "the optimizer stopped before its rule was met (gᵀHg is {:.1e} of the energy, wanted {TOLERANCE:.0e}); the map is valid but could be better",
+            best.1.decrement / best.1.value
+        ));
+    }
+    report.warnings.append(&mut run.notes);
+    report.seconds = start.elapsed().as_secs_f64();
+    Ok((best.0, report))
+}
+
+/// One building of a map, with what has been spent on it.
+struct Run<'a> {
+    field: &'a Heightfield,
+    progress: &'a mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+    /// The last outcome; iterations and evaluations are sums.
+    outcome: Outcome,
+    notes: Vec<String>,
+}
+
+impl Run<'_> {
+    fn coarse_to_fine(&mut self, spec: &MapSpec, rule: Rule) -> Result<WarpMap> {
+        let mut cells = spec.cells;
+        let mut halvings = Vec::new();
+        loop {
+            let halve = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
+            if halve == [false; 3] {
+                break;
+            }
+            cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
+            halvings.push(halve);
+        }
+        let mut map = WarpMap::shear(
+            self.field,
+            &MapSpec {
+                cells,
+                ..spec.clone()
+            },
+        )?;
+        map = self.minimized(&map, rule)?;
+        for halve in halvings.into_iter().rev() {
+            map = self.minimized(&map.refined(halve), rule)?;
+        }
+        Ok(map)
+    }
+
+    /// The minimizer on the grid of `start`.
+    fn minimized(&mut self, start: &WarpMap, rule: Rule) -> Result<WarpMap> {
+        let cells = start.cells();
+        let mut problem = Problem::new(self.field, Mips, start, rule)?;
+        let limits = Limits {
+            iterations: MAX_ITERATIONS,
+            tolerance: TOLERANCE,
+        };
+        let progress = &mut *self.progress;
+        let mut report = |iteration, energy, decrement: f64| {
+            progress(MapProgress {
+                cells,
+                iteration,
+                energy,
+                decrement: decrement / energy,
+                tolerance: TOLERANCE,
+            })
+        };
+        let mut u = problem.seated(start);
+        let mut outcome = minimize(&mut problem, &mut u, limits, &mut report);
+        if !outcome.value.is_finite() {
+            // What was fine on the coarser grid is folded on this one. The shear never is.
+            let spec = MapSpec {
+                cells,
+                thickness: start.size()[2],
+                ..MapSpec::default()
+            };
+            u = problem.seated(&WarpMap::shear(self.field, &spec)?);
+            outcome = minimize(&mut problem, &mut u, limits, &mut report);
+        }
+        if outcome.interrupted {
+            return Err(Error::input(
+                "building the warp map was stopped before it was done",
+            ));
+        }
+        outcome.iterations += self.outcome.iterations;
+        outcome.evaluations += self.outcome.evaluations;
+        self.outcome = outcome;
+        Ok(problem.to_map(&u, start))
+    }
+}

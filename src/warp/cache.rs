@@ -1,0 +1,148 @@
+//! Maps that were built before, by the content of what they depend on.
+//!
+//! A cache file holds one line of JSON (a header) and then the control points as little-endian floats. Its name is the
+//! SHA-256 of the terrain's samples, the specification and [`SOLVER_VERSION`].
+
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{MapProgress, MapReport, WarpMap, build};
+use crate::heightfield::Heightfield;
+use crate::scenario::MapSpec;
+use crate::{Error, Result};
+
+/// To be raised with every change that makes a different map of the same terrain.
+const SOLVER_VERSION: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    /// SHA-256 of what follows the header.
+    checksum: String,
+    report: MapReport,
+}
+
+/// `$WARPGAIT_CACHE`, else `$XDG_CACHE_HOME/warpgait`, else `~/.cache/warpgait`; none where neither is set.
+pub fn default_cache_dir() -> Option<PathBuf> {
+    let from = |name: &str| {
+        std::env::var_os(name)
+            .filter(|v| !v.is_empty())
+            .map(PathBuf::from)
+    };
+    from("WARPGAIT_CACHE")
+        .or_else(|| from("XDG_CACHE_HOME").map(|d| d.join("warpgait")))
+        .or_else(|| from("HOME").map(|d| d.join(".cache").join("warpgait")))
+}
+
+/// As [`build`], but takes the map from `cache_dir` where it was built before, and keeps it there otherwise. The last value
+/// tells whether it came from the cache.
+///
+/// A cache file that is damaged is built again and replaced. Where the cache cannot be written, the report has a warning.
+///
+/// # Errors
+/// Those of [`build`].
+pub fn build_cached(
+    field: &Heightfield,
+    spec: &MapSpec,
+    cache_dir: Option<&Path>,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<(WarpMap, MapReport, bool)> {
+    let Some(directory) = cache_dir else {
+        let (map, report) = build(field, spec, progress)?;
+        return Ok((map, report, false));
+    };
+    let path = directory.join(format!("{}.warpmap", key(field, spec)));
+    if let Some((map, report)) = read(&path, field, spec) {
+        return Ok((map, report, true));
+    }
+    let (map, mut report) = build(field, spec, progress)?;
+    if let Err(error) = write(&path, &map, &report) {
+        report
+            .warnings
+            .push(format!("the map could not be kept for next time ({error})"));
+    }
+    Ok((map, report, false))
+}
+
+/// Everything a map depends on, hashed.
+fn key(field: &Heightfield, spec: &MapSpec) -> String {
+    let mut hash = Sha256::new();
+    hash.update(SOLVER_VERSION.to_le_bytes());
+    hash.update(format!("{spec:?}"));
+    let grid = field.grid();
+    for n in [grid.columns, grid.rows] {
+        hash.update((n as u64).to_le_bytes());
+    }
+    for v in grid
+        .origin
+        .iter()
+        .chain(&grid.spacing)
+        .chain(field.samples())
+    {
+        hash.update(v.to_le_bytes());
+    }
+    hex(&hash.finalize())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The map in a cache file; none if there is no such file or it is not whole.
+fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, MapReport)> {
+    let bytes = std::fs::read(path).ok()?;
+    let end = bytes.iter().position(|b| *b == b'\n')?;
+    let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
+    let payload = &bytes[end + 1..];
+    if hex(&Sha256::digest(payload)) != header.checksum {
+        return None;
+    }
+    let mut map = WarpMap::flat(field.extent(), spec).ok()?;
+    let points = map.control_points_mut();
+    if payload.len() != size_of_val(points) {
+        return None;
+    }
+    let values = payload
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|b| f64::from_le_bytes(*b));
+    for (target, value) in points.as_flattened_mut().iter_mut().zip(values) {
+        *target = value;
+    }
+    Some((map, header.report))
+}
+
+/// Written aside and then renamed, so that no reader ever sees half a file.
+fn write(path: &Path, map: &WarpMap, report: &MapReport) -> Result<()> {
+    let payload: Vec<u8> = map
+        .control_points()
+        .as_flattened()
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let header = Header {
+        checksum: hex(&Sha256::digest(&payload)),
+        report: report.clone(),
+    };
+    let header =
+        serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    let directory = path.parent().unwrap_or(Path::new("."));
+    std::fs::create_dir_all(directory).map_err(|e| Error::io(directory, e))?;
+    // Two processes may build the same map at once: each writes its own file.
+    let aside = path.with_extension(format!("{}.part", std::process::id()));
+    let written = std::fs::File::create(&aside).and_then(|mut file| {
+        file.write_all(&header)?;
+        file.write_all(b"\n")?;
+        file.write_all(&payload)?;
+        std::fs::rename(&aside, path)
+    });
+    written.map_err(|e| {
+        // The half-written file is of no use; that it cannot be removed either is no further news.
+        let _ = std::fs::remove_file(&aside);
+        Error::io(&aside, e)
+    })
+}

@@ -1,0 +1,121 @@
+//! Energy densities of the map: what makes a Jacobian cost something.
+
+use super::lanes::Lanes;
+
+/// An energy density ρ(J). Jacobians are flat: `[3 c + d]` = ∂φ_c/∂x̄_d, at a few points at once.
+pub(super) trait Density: Copy {
+    /// ρ and ∂ρ/∂J; ρ is infinite where J is not allowed.
+    fn at(&self, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]);
+}
+
+/// The scale-invariant mean of the squared singular values, ρ = ¼(‖J‖² / det^⅔ − 3): zero where J is a scaled rotation
+/// (by the inequality of the means), infinite where space would fold.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mips;
+
+impl Density for Mips {
+    #[inline(always)]
+    fn at(&self, j: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
+        let cofactor = cofactors(j);
+        let det = j[0] * cofactor[0] + j[1] * cofactor[1] + j[2] * cofactor[2];
+        let mut norm = j[0] * j[0];
+        for v in &j[1..] {
+            norm += *v * *v;
+        }
+        let root = inverse_cube_root(det.map(|d| d.max(MIN_DET)));
+        let scale = root * root;
+        let ratio = norm * scale;
+        let barrier = det.map(|d| if d > MIN_DET { 0.0 } else { f64::INFINITY });
+        let energy = 0.25 * (ratio - Lanes::splat(3.0)) + barrier;
+        // ∂/∂J of ‖J‖² det^(−⅔) is 2 det^(−⅔) (J − ‖J‖²/(3 det) cof J).
+        let pull = (1.0 / 3.0) * (ratio * root);
+        let half = 0.5 * scale;
+        let mut gradient = cofactor;
+        for i in 0..9 {
+            gradient[i] = half * (j[i] - pull * cofactor[i]);
+        }
+        (energy, gradient)
+    }
+}
+
+/// cof J = ∂ det J / ∂J.
+#[inline(always)]
+fn cofactors(j: &[Lanes; 9]) -> [Lanes; 9] {
+    [
+        j[4] * j[8] - j[5] * j[7],
+        j[5] * j[6] - j[3] * j[8],
+        j[3] * j[7] - j[4] * j[6],
+        j[2] * j[7] - j[1] * j[8],
+        j[0] * j[8] - j[2] * j[6],
+        j[1] * j[6] - j[0] * j[7],
+        j[1] * j[5] - j[2] * j[4],
+        j[2] * j[3] - j[0] * j[5],
+        j[0] * j[4] - j[1] * j[3],
+    ]
+}
+
+/// det J.
+#[inline(always)]
+pub(super) fn determinant(j: &[Lanes; 9]) -> Lanes {
+    let cofactor = cofactors(j);
+    j[0] * cofactor[0] + j[1] * cofactor[1] + j[2] * cofactor[2]
+}
+
+/// Determinants up to here count as folded; it keeps the powers below within range.
+const MIN_DET: f64 = 1e-12;
+
+/// x^(−⅓) for 1e-12 ≤ x ≤ 1e30, to rounding: a guess from the exponent, sharpened by Newton's method y ← y(4 − x y³)/3.
+#[inline(always)]
+fn inverse_cube_root(x: Lanes) -> Lanes {
+    // The bits of a float are close to a linear function of its logarithm; this constant makes the error even.
+    let mut y = x.map(|x| f64::from(f32::from_bits(0x54a2_1d2a - (x as f32).to_bits() / 3)));
+    for _ in 0..4 {
+        y = (1.0 / 3.0) * y * (Lanes::splat(4.0) - x * y * (y * y));
+    }
+    y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(j: [f64; 9]) -> (f64, [f64; 9]) {
+        let (energy, gradient) = Mips.at(&j.map(Lanes::splat));
+        (energy.0[1], gradient.map(|g| g.0[1]))
+    }
+
+    #[test]
+    fn inverse_cube_roots_are_exact_to_rounding() {
+        let mut x = 1.1e-12;
+        while x < 1e12 {
+            let exact = 1.0 / f64::cbrt(x);
+            let error = inverse_cube_root(Lanes::splat(x)).0[0] / exact - 1.0;
+            assert!(error.abs() < 1e-14, "{x}: {error}");
+            x *= 1.037;
+        }
+    }
+
+    #[test]
+    fn mips_is_zero_on_scaled_rotations_and_infinite_on_folds() {
+        let (s, c) = 0.7_f64.sin_cos();
+        let (energy, gradient) = at([3.0 * c, -3.0 * s, 0.0, 3.0 * s, 3.0 * c, 0.0, 0.0, 0.0, 3.0]);
+        assert!(energy.abs() < 1e-13 && gradient.iter().all(|g| g.abs() < 1e-13));
+        let (folded, _) = at([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0]);
+        assert_eq!(folded, f64::INFINITY);
+    }
+
+    #[test]
+    fn mips_gradient_matches_central_differences() {
+        let j = [1.1, 0.3, -0.2, 0.1, 0.8, 0.25, -0.4, 0.2, 1.3];
+        let (_, gradient) = at(j);
+        for i in 0..9 {
+            let moved = |step: f64| {
+                let mut moved = j;
+                moved[i] += step;
+                at(moved).0
+            };
+            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            assert!((slope - gradient[i]).abs() < 1e-9, "{i}");
+        }
+    }
+}

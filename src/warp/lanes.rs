@@ -1,0 +1,72 @@
+//! A few numbers at once, so that arithmetic on quadrature points is vectorized.
+
+use std::ops::{Add, AddAssign, Mul, Sub};
+
+/// How many. (Loops rather than array functions below: compilers inline and vectorize these reliably.)
+pub(super) const LANES: usize = 4;
+
+/// One number at each of a few points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lanes(pub [f64; LANES]);
+
+impl Lanes {
+    pub const ZERO: Lanes = Lanes([0.0; LANES]);
+
+    /// The same number at all points.
+    #[inline(always)]
+    pub fn splat(value: f64) -> Lanes {
+        Lanes([value; LANES])
+    }
+
+    /// A function of each number.
+    #[inline(always)]
+    pub fn map(mut self, f: impl Fn(f64) -> f64) -> Lanes {
+        for value in &mut self.0 {
+            *value = f(*value);
+        }
+        self
+    }
+
+    /// The sum over the points.
+    pub fn sum(self) -> f64 {
+        self.0.iter().sum()
+    }
+
+    /// The numbers of a slice of blocks, one after the other.
+    pub fn flat(blocks: &[Lanes]) -> impl Iterator<Item = &f64> {
+        blocks.iter().flat_map(|b| &b.0)
+    }
+}
+
+macro_rules! elementwise {
+    ($trait:ident, $method:ident, $op:tt) => {
+        impl $trait for Lanes {
+            type Output = Lanes;
+            #[inline(always)]
+            fn $method(mut self, other: Lanes) -> Lanes {
+                for l in 0..LANES {
+                    self.0[l] $op other.0[l];
+                }
+                self
+            }
+        }
+    };
+}
+elementwise!(Add, add, +=);
+elementwise!(Sub, sub, -=);
+elementwise!(Mul, mul, *=);
+
+impl Mul<Lanes> for f64 {
+    type Output = Lanes;
+    #[inline(always)]
+    fn mul(self, lanes: Lanes) -> Lanes {
+        lanes.map(|v| self * v)
+    }
+}
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Lanes) {
+        *self = *self + other;
+    }
+}

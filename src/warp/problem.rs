@@ -1,0 +1,194 @@
+//! The map's optimization problem: minimize ∫ w ρ(J) dV over the maps whose bottom face is the terrain.
+//!
+//! Unknowns are the coefficients u of φ with face values at the ends of each axis (see `Axis`), component by component.
+//! φ₀ is fixed on the x-faces, φ₁ on the y-faces. The coefficients of φ₂ on the bottom face are not free: they are the L²
+//! projection of h(φ₀, φ₁), and the gradient with respect to them flows on to φ₀ and φ₁ (elimination of Eq. 6's second
+//! term, which makes the match exact up to the projection).
+
+use super::WarpMap;
+use super::assembly::Assembly;
+use super::axis::{Axis, Rule};
+use super::bottom::Bottom;
+use super::density::Density;
+use super::lbfgs::Objective;
+use super::preconditioner::Preconditioner;
+use crate::Result;
+use crate::heightfield::Heightfield;
+
+/// The weight of the energy over z̄: the ground matters most, the torso's surroundings somewhat, the top hardly.
+fn weight(z: f64) -> f64 {
+    (-z / 0.25).exp() + 0.03
+}
+
+/// Weight of the bottom face against the volume, m.
+const FACE_WEIGHT: f64 = 0.5;
+
+/// The problem on one grid.
+pub(super) struct Problem<'a, D> {
+    field: &'a Heightfield,
+    density: D,
+    axes: [Axis; 3],
+    assembly: Assembly,
+    bottom: Bottom,
+    preconditioner: Preconditioner,
+}
+
+impl<'a, D: Density> Problem<'a, D> {
+    /// On the grid of `map`.
+    ///
+    /// # Errors
+    /// Internal ones of the preconditioner.
+    pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, rule: Rule) -> Result<Self> {
+        let axes: [Axis; 3] = std::array::from_fn(|d| Axis {
+            cells: map.cells()[d],
+            cell: map.cell()[d],
+        });
+        let assembly = Assembly::new(axes, rule, weight, FACE_WEIGHT);
+        let bottom = Bottom::new(&axes[0], &axes[1]);
+        let [nx, ny, nz] = axes.map(|a| a.len());
+        let free = [
+            [1..nx - 1, 0..ny, 0..nz],
+            [0..nx, 1..ny - 1, 0..nz],
+            [0..nx, 0..ny, 1..nz],
+        ];
+        let samples = std::array::from_fn(|d| assembly.samples(d));
+        let preconditioner = Preconditioner::new(samples, free)?;
+        Ok(Problem {
+            field,
+            density,
+            axes,
+            assembly,
+            bottom,
+            preconditioner,
+        })
+    }
+
+    /// The coefficients of a map, moved up or down as a whole column so that its bottom lies on the ground.
+    pub fn seated(&self, map: &WarpMap) -> Vec<f64> {
+        let mut u = coefficients_of(map, &self.axes);
+        let before = self.face(&u, 2);
+        let ground = self.ground(&u).1;
+        let nz = self.axes[2].len();
+        let third = 2 * u.len() / 3;
+        for ((column, ground), before) in u[third..].chunks_exact_mut(nz).zip(ground).zip(before) {
+            for v in column {
+                *v += ground - before;
+            }
+        }
+        u
+    }
+
+    /// The map with these coefficients, on the grid of `map`.
+    pub fn to_map(&self, u: &[f64], map: &WarpMap) -> WarpMap {
+        let mut out = map.clone();
+        let mut u = u.to_vec();
+        for axis in 0..3 {
+            along(&mut u, self.axes.map(|a| a.len()), axis, |line| {
+                self.axes[axis].face_to_control(line)
+            });
+        }
+        let n = u.len() / 3;
+        for (i, point) in out.control_points_mut().iter_mut().enumerate() {
+            *point = std::array::from_fn(|c| u[c * n + i]);
+        }
+        out
+    }
+
+    /// The bottom-face coefficients of one component.
+    fn face(&self, u: &[f64], component: usize) -> Vec<f64> {
+        let n = u.len() / 3;
+        u[component * n..][..n]
+            .iter()
+            .step_by(self.axes[2].len())
+            .copied()
+            .collect()
+    }
+
+    /// φ₀, φ₁ at the Gauss points of the bottom, and the bottom-face coefficients that φ₂ must have there.
+    fn ground(&self, u: &[f64]) -> ([Vec<f64>; 2], Vec<f64>) {
+        let at = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
+        let heights: Vec<f64> = at[0]
+            .iter()
+            .zip(&at[1])
+            .map(|(x, y)| self.field.height(*x, *y))
+            .collect();
+        let face = self.bottom.project(&heights);
+        (at, face)
+    }
+}
+
+impl<D: Density> Objective for Problem<'_, D> {
+    fn evaluate(&mut self, u: &mut [f64], gradient: &mut [f64]) -> f64 {
+        let [nx, ny, nz] = self.axes.map(|a| a.len());
+        let n = nx * ny * nz;
+        let (at, face) = self.ground(u);
+        for (v, ground) in u[2 * n..].iter_mut().step_by(nz).zip(&face) {
+            *v = *ground;
+        }
+        let energy = self.assembly.energy(self.density, u, gradient);
+        if !energy.is_finite() {
+            return energy;
+        }
+        // The eliminated coefficients pass their gradient on by the chain rule.
+        let pull = self.bottom.project_adjoint(&self.face(gradient, 2));
+        let mut by_axis = [pull.clone(), pull];
+        for (i, (x, y)) in at[0].iter().zip(&at[1]).enumerate() {
+            let slope = self.field.gradient(*x, *y);
+            by_axis[0][i] *= slope[0];
+            by_axis[1][i] *= slope[1];
+        }
+        for (c, pulled) in by_axis.iter().enumerate() {
+            let added = self.bottom.values_adjoint(pulled);
+            for (g, a) in gradient[c * n..][..n].iter_mut().step_by(nz).zip(&added) {
+                *g += a;
+            }
+        }
+        // What is fixed.
+        gradient[2 * n..]
+            .iter_mut()
+            .step_by(nz)
+            .for_each(|g| *g = 0.0);
+        gradient[..ny * nz].fill(0.0);
+        gradient[(nx - 1) * ny * nz..n].fill(0.0);
+        for slab in gradient[n..2 * n].chunks_exact_mut(ny * nz) {
+            slab[..nz].fill(0.0);
+            slab[(ny - 1) * nz..].fill(0.0);
+        }
+        energy
+    }
+
+    fn precondition(&mut self, v: &mut [f64]) {
+        self.preconditioner.apply(v);
+    }
+}
+
+/// Control points, component by component, with face values at the ends of each axis.
+pub(super) fn coefficients_of(map: &WarpMap, axes: &[Axis; 3]) -> Vec<f64> {
+    let mut u = Vec::with_capacity(3 * map.control_points().len());
+    for c in 0..3 {
+        u.extend(map.control_points().iter().map(|p| p[c]));
+    }
+    for axis in 0..3 {
+        along(&mut u, axes.map(|a| a.len()), axis, |line| {
+            axes[axis].control_to_face(line)
+        });
+    }
+    u
+}
+
+/// Applies `change` to every line of coefficients along an axis.
+fn along(u: &mut [f64], shape: [usize; 3], axis: usize, change: impl Fn(&mut [f64])) {
+    let stride: usize = shape[axis + 1..].iter().product();
+    let mut line = vec![0.0; shape[axis]];
+    for block in u.chunks_exact_mut(shape[axis] * stride) {
+        for s in 0..stride {
+            for (l, v) in line.iter_mut().zip(block[s..].iter().step_by(stride)) {
+                *l = *v;
+            }
+            change(&mut line);
+            for (l, v) in line.iter().zip(block[s..].iter_mut().step_by(stride)) {
+                *v = *l;
+            }
+        }
+    }
+}
