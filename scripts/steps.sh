@@ -4,6 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+export CARGO_TERM_COLOR=never # logs are files
 log_dir=target/log
 mkdir -p "$log_dir"
 
