@@ -276,7 +276,13 @@ fn transparent_pixels_are_holes_in_every_flavour() {
     let grey = |i: usize| if i == hole { 250 } else { 100 };
     let alpha = |i: usize| if i == hole { 0 } else { 255 };
     let all = 0..20_usize;
-    let cases: [(&str, _, [Option<&[u8]>; 2], Vec<u8>); 5] = [
+    type Case = (
+        &'static str,
+        (ColorType, BitDepth),
+        [Option<&'static [u8]>; 2],
+        Vec<u8>,
+    );
+    let cases: [Case; 5] = [
         (
             "grey + alpha",
             (GrayscaleAlpha, Eight),

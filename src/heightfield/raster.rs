@@ -9,7 +9,7 @@ const FILLED_WEIGHT: f64 = 0.25;
 /// The kernel is cut off at this many standard deviations.
 const KERNEL_REACH: f64 = 3.0;
 /// A hole counts as filled when a sweep moves no height by more than this share of the height range.
-const FILL_TOLERANCE: f64 = 1e-7;
+const FILL_TOLERANCE: f64 = 1e-6;
 /// Sweeps after which an enormous hole is smooth enough anyway.
 const FILL_SWEEPS: usize = 5000;
 

@@ -226,12 +226,7 @@ impl Parser<'_> {
         let rest = &self.text[self.position..];
         let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
         let name = &rest[..end];
-        let unknown = self.error(&format!(
-            "{name:?} is unknown; there are the variables x and y, the constants {}, and the functions {}, {}",
-            names(&CONSTANTS),
-            names(&FUNCTIONS),
-            names(&FUNCTIONS_OF_TWO)
-        ));
+        let start = self.position;
         self.position += end;
         if let Some((_, f)) = FUNCTIONS.iter().find(|(n, _)| *n == name) {
             self.expect('(')?;
@@ -248,14 +243,20 @@ impl Parser<'_> {
             return Ok(binary(*f, first, second));
         }
         match name {
-            "x" => Ok(Node::X),
-            "y" => Ok(Node::Y),
-            _ => CONSTANTS
-                .iter()
-                .find(|(n, _)| n.eq_ignore_ascii_case(name))
-                .map(|(_, value)| Node::Number(*value))
-                .ok_or(unknown),
+            "x" => return Ok(Node::X),
+            "y" => return Ok(Node::Y),
+            _ => (),
         }
+        if let Some((_, value)) = CONSTANTS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)) {
+            return Ok(Node::Number(*value));
+        }
+        self.position = start;
+        Err(self.error(&format!(
+            "{name:?} is unknown; there are the variables x and y, the constants {}, and the functions {} {}",
+            names(&CONSTANTS),
+            names(&FUNCTIONS),
+            names(&FUNCTIONS_OF_TWO)
+        )))
     }
 
     fn expect(&mut self, wanted: char) -> Result<()> {
