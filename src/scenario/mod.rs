@@ -297,7 +297,7 @@ impl Default for MotionSpec {
             base_clearance: 0.10,
             force_limit: 2.0,
             pull_limit: 1.2,
-            smoothness: [1e-4, 1e-4],
+            smoothness: [1e-3, 1e-4],
         }
     }
 }
