@@ -25,6 +25,16 @@ const NOISE: f64 = 1e-6;
 
 /// Compares all first derivatives at x, and the second ones if the problem has them, in the directions of `variables`.
 pub fn check(problem: &mut Problem, x: &[f64], variables: &[usize]) -> Vec<DerivativeError> {
+    check_with(problem, x, variables, |_| {})
+}
+
+/// The same, with the Jacobian's values changed by `tamper` before they are looked at: to see that the check sees.
+pub fn check_with(
+    problem: &mut Problem,
+    x: &[f64],
+    variables: &[usize],
+    tamper: impl FnOnce(&mut [f64]),
+) -> Vec<DerivativeError> {
     let (rows, columns) = {
         let (r, c) = problem.jacobian_structure();
         (r.to_vec(), c.to_vec())
@@ -33,6 +43,7 @@ pub fn check(problem: &mut Problem, x: &[f64], variables: &[usize]) -> Vec<Deriv
     // Poisoned: an entry that is not written shows.
     let mut values = vec![f64::NAN; rows.len()];
     problem.jacobian_values(x, true, &mut values);
+    tamper(&mut values);
     let n = problem.num_variables();
     let mut gradient = vec![f64::NAN; n];
     problem.gradient(x, true, &mut gradient);

@@ -22,8 +22,6 @@ use super::model::Model;
 use super::sink::{Pattern, Sink};
 use super::state::{Curvature, State};
 
-/// Taken off the reach boxes, m, so that they hold between the samples: (standing, swinging).
-const REACH_MARGIN: (f64, f64) = (0.001, 0.004);
 /// Asked for beyond `base_clearance`, m, so that it holds between the points and samples that are looked at.
 const CLEARANCE_MARGIN: f64 = 0.01;
 /// The objective is this times the scenario's costs: Ipopt's tests of optimality are absolute, and with an objective of the
@@ -75,7 +73,7 @@ impl Problem {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
                 Law::Pcdm | Law::NewtonEuler => Box::new(Dynamics::centred(intervals)),
             },
-            Box::new(Reach::new(&model, REACH_MARGIN)),
+            Box::new(Reach::new(&model)),
             match contact.cone {
                 Cone::Exact => Box::new(Friction::new(&model, contact.friction)),
                 Cone::Conformal => Box::new(FrictionConformal::new(&model, contact.friction)),

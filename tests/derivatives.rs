@@ -1,0 +1,131 @@
+//! Every constraint and cost, in both formulations, on curved terrains, at random points, against central differences: first
+//! and second derivatives, with NaN-poisoned buffers, and no entry missing from the patterns.
+
+use std::sync::Arc;
+
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use warpgait::ipopt::NlpProblem;
+use warpgait::nlp::derivatives;
+use warpgait::nlp::problem::{Choice, Problem};
+use warpgait::nlp::{Model, guess};
+use warpgait::robot::Robot;
+use warpgait::scenario::Scenario;
+use warpgait::trajectory::space::Space;
+use warpgait::warp::WarpMap;
+
+/// Largest relative error allowed; the step of the differences is 1e-5, their own error some 1e-9.
+const TOLERANCE: f64 = 1e-6;
+
+const TERRAINS: [(&str, &str); 5] = [
+    ("rippled", "kind = \"rippled\""),
+    ("conic", "kind = \"conic\""),
+    ("hilly", "kind = \"hilly\""),
+    ("pit", "kind = \"pit\""),
+    ("formula", "kind = \"formula\"\nexpression = \"0.1*sin(2*x)*cos(1.5*y) + 0.05*x*y\""),
+];
+
+/// A short motion over a terrain, with everything that can be switched on.
+fn problem(terrain: &str, formulation: &str, extra: &str) -> Problem {
+    let text = format!(
+        "schema = 1\nformulation = \"{formulation}\"\nhorizon = 2.5\n\
+         [robot]\nname = \"anymal_towr\"\nadhesive_feet = [\"RF\"]\n\
+         [terrain]\n{terrain}\nspacing = 0.05\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
+         [start]\nposition = [0.3, 0.2]\n[goal]\nposition = [0.6, 0.1]\nyaw = 0.2\n\
+         [map]\nmethod = \"shear\"\ncells = [24, 24, 12]\n{extra}"
+    );
+    let scenario: Scenario = toml::from_str(&text).expect("a scenario");
+    let robot: Robot = toml::from_str(include_str!("../robots/anymal_towr.toml")).expect("a robot");
+    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
+    let field = Arc::new(ground.field);
+    let space = match formulation {
+        "direct" => Space::Direct,
+        _ => {
+            // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
+            let shear = WarpMap::shear(&field, &scenario.map).expect("a map");
+            Space::Warped(Box::new(bent(&shear)))
+        }
+    };
+    let model = Model::new(&scenario, &robot, field, space).expect("a model");
+    let x = guess::guess(&scenario, &model).expect("a guess");
+    Problem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
+}
+
+/// The map with its control points moved smoothly in all three coordinates.
+fn bent(map: &WarpMap) -> WarpMap {
+    let mut grid = map.to_grid();
+    for p in &mut grid.control_points {
+        let [x, y, z] = *p;
+        p[0] += 0.05 * (1.3 * x + 0.7 * z).sin();
+        p[1] += 0.05 * (0.9 * y - 0.8 * x).cos();
+        p[2] += 0.04 * (1.1 * x + 0.6 * y + 0.5 * z).sin();
+    }
+    WarpMap::from_grid(&grid).expect("a map")
+}
+
+fn initial(problem: &Problem) -> Vec<f64> {
+    let mut x = vec![0.0; problem.num_variables()];
+    problem.initial_point(&mut x);
+    x
+}
+
+fn check(mut problem: Problem, name: &str) {
+    let start = initial(&problem);
+    let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let mut runner = TestRunner::new_with_rng(Config { cases: 1, ..Config::default() }, rng);
+    for _ in 0..2 {
+        let noise = proptest::collection::vec(-0.03..0.03_f64, start.len())
+            .new_tree(&mut runner)
+            .expect("noise")
+            .current();
+        let x: Vec<f64> = start.iter().zip(&noise).map(|(x, n)| x + n).collect();
+        let picks =
+            proptest::collection::vec(0..start.len(), 150).new_tree(&mut runner).expect("picks").current();
+        for error in derivatives::check(&mut problem, &x, &picks) {
+            assert!(
+                error.largest < TOLERANCE && error.missing == 0,
+                "{name}, {}: relative error {:.2e} at {}, {} entries missing",
+                error.block,
+                error.largest,
+                error.place,
+                error.missing
+            );
+        }
+    }
+}
+
+#[test]
+fn warped_blocks_match_differences_on_all_terrains() {
+    for (name, terrain) in TERRAINS {
+        check(problem(terrain, "warped", "[contact]\nmax_slope = 0.9"), name);
+    }
+}
+
+#[test]
+fn direct_blocks_match_differences_on_all_terrains() {
+    for (name, terrain) in TERRAINS {
+        check(problem(terrain, "direct", "[contact]\nmax_slope = 0.9"), name);
+    }
+}
+
+#[test]
+fn other_laws_and_cones_match_differences() {
+    for formulation in ["warped", "direct"] {
+        for extra in ["[physics]\nlaw = \"pcdm-backward\"", "[contact]\ncone = \"conformal\""] {
+            check(problem(TERRAINS[1].1, formulation, extra), extra);
+        }
+    }
+}
+
+/// The check itself must see a wrong derivative: one entry of the Jacobian off by 1e-3.
+#[test]
+fn the_check_is_not_blind() {
+    let mut problem = problem(TERRAINS[0].1, "warped", "");
+    // Off the guess, which stands on knots of the ground, where third derivatives jump.
+    let x: Vec<f64> =
+        initial(&problem).iter().enumerate().map(|(i, x)| x + 0.01 * (i as f64).sin()).collect();
+    let all: Vec<usize> = (0..x.len()).collect();
+    assert!(derivatives::check(&mut problem, &x, &all).iter().all(|e| e.largest < TOLERANCE));
+    let wrong = derivatives::check_with(&mut problem, &x, &all, |values| values[17] += 1e-3);
+    assert!(wrong.iter().any(|e| e.largest > TOLERANCE));
+}

@@ -1,0 +1,369 @@
+//! Terrains that must be refused: each with one clear sentence, none with a panic.
+
+use std::fs;
+use std::path::Path;
+
+use warpgait::Error;
+use warpgait::scenario::TerrainSpec;
+use warpgait::terrain::build;
+
+/// The message with which a terrain is refused.
+fn refusal(text: &str, folder: &Path) -> String {
+    let spec: TerrainSpec = toml::from_str(text).unwrap();
+    match build(&spec, folder) {
+        Err(Error::Input(message)) => message,
+        Err(other) => panic!("{text}: not an input error: {other}"),
+        Ok(_) => panic!("{text}: accepted"),
+    }
+}
+
+fn assert_refused(text: &str, folder: &Path, parts: &[&str]) {
+    let message = refusal(text, folder);
+    for part in parts {
+        assert!(
+            message.contains(part),
+            "{text}\nsays {message:?}\nwithout {part:?}"
+        );
+    }
+}
+
+const MAP: &str = "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.04\n";
+
+/// Refusal of a heightmap whose file holds these bytes.
+fn assert_file_refused(bytes: &[u8], more: &str, parts: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("f"), bytes).unwrap();
+    assert_refused(&format!("{MAP}{more}"), folder.path(), parts);
+}
+
+fn png(columns: u32, rows: u32, data: &[u8], color: png::ColorType) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, columns, rows);
+    encoder.set_color(color);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(data)
+        .unwrap();
+    bytes
+}
+
+fn grey(columns: u32, rows: u32) -> Vec<u8> {
+    let data: Vec<u8> = (0..columns * rows).map(|i| (i % 251) as u8).collect();
+    png(columns, rows, &data, png::ColorType::Grayscale)
+}
+
+/// The signature and header of a PNG of that size, and nothing else: what a decoder sees before it allocates.
+fn png_header(columns: u32, rows: u32) -> Vec<u8> {
+    let whole = grey(4, 4);
+    let mut bytes = whole[..33].to_vec();
+    bytes[16..20].copy_from_slice(&columns.to_be_bytes());
+    bytes[20..24].copy_from_slice(&rows.to_be_bytes());
+    let sum = crc32(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&sum.to_be_bytes());
+    bytes
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0_u32, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
+            if c & 1 == 1 {
+                (c >> 1) ^ 0xEDB8_8320
+            } else {
+                c >> 1
+            }
+        })
+    })
+}
+
+fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data);
+    bytes
+}
+
+fn floats(values: impl IntoIterator<Item = f64>) -> Vec<u8> {
+    values.into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
+#[test]
+fn keys_of_another_kind() {
+    let here = Path::new("");
+    assert_refused(
+        "kind = \"rippled\"\ndepth = 0.5",
+        here,
+        &[
+            "terrain.depth",
+            "\"rippled\"",
+            "amplitude",
+            "wavelength",
+            "extent",
+        ],
+    );
+    assert_refused(
+        "kind = \"flat\"\nlevel = \"easy\"",
+        here,
+        &["terrain.level", "extent, spacing"],
+    );
+    assert_refused(
+        "kind = \"conic\"\nwidth = 1.0",
+        here,
+        &["slope, radius, tip, foot"],
+    );
+    assert_refused("kind = \"pit\"\nfile = \"a.png\"", here, &["terrain.file"]);
+    assert_refused(
+        "kind = \"formula\"\nexpression = \"x\"\namplitude = 1.0",
+        here,
+        &["terrain.amplitude"],
+    );
+    assert_refused(
+        &format!("{MAP}expression = \"x\""),
+        here,
+        &["terrain.expression", "height_scale"],
+    );
+}
+
+#[test]
+fn missing_keys() {
+    let here = Path::new("");
+    assert_refused(
+        "kind = \"formula\"",
+        here,
+        &["terrain.expression is missing"],
+    );
+    assert_refused(
+        "kind = \"heightmap\"\nspacing = 0.1",
+        here,
+        &["terrain.file is missing"],
+    );
+    assert_refused(
+        "kind = \"heightmap\"\nfile = \"f\"",
+        here,
+        &["terrain.spacing is missing"],
+    );
+    assert_file_refused(
+        &grey(5, 5),
+        "",
+        &["terrain.height_scale is missing", "black to white"],
+    );
+}
+
+#[test]
+fn values_out_of_range() {
+    let here = Path::new("");
+    for text in [
+        "kind = \"rippled\"\nwavelength = 0.0",
+        "kind = \"rippled\"\namplitude = nan",
+        "kind = \"rippled\"\namplitude = inf",
+        "kind = \"conic\"\nfoot = -0.1",
+        "kind = \"conic\"\ntip = 0.0",
+        "kind = \"hilly\"\nheight = 1e9",
+        "kind = \"pit\"\nedge = 0.0",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.0",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = nan",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\norigin = [0.0, inf]",
+    ] {
+        assert_refused(text, here, &["out of range", "between"]);
+    }
+    for more in ["height_scale = nan", "height_scale = 1e9"] {
+        assert_file_refused(&grey(5, 5), more, &["terrain.height_scale", "out of range"]);
+    }
+    for more in ["smoothing = -0.1", "smoothing = 50.0", "smoothing = nan"] {
+        let more = format!("height_scale = 1.0\n{more}");
+        assert_file_refused(&grey(5, 5), &more, &["terrain.smoothing", "out of range"]);
+    }
+}
+
+#[test]
+fn extents_and_grids() {
+    let here = Path::new("");
+    for extent in [
+        "[1.0, 1.0, 0.0, 1.0]",
+        "[1.0, -1.0, 0.0, 1.0]",
+        "[0.0, nan, 0.0, 1.0]",
+        "[-inf, inf, 0.0, 1.0]",
+    ] {
+        assert_refused(
+            &format!("kind = \"hilly\"\nextent = {extent}"),
+            here,
+            &["extent", "x_min < x_max"],
+        );
+    }
+    for spacing in ["0.0", "-0.1", "nan", "inf"] {
+        assert_refused(
+            &format!("kind = \"flat\"\nspacing = {spacing}"),
+            here,
+            &["spacing", "positive"],
+        );
+    }
+    assert_refused(
+        "kind = \"flat\"\nspacing = 1e-5",
+        here,
+        &["nodes", "spacing of at least"],
+    );
+    assert_refused(
+        "kind = \"flat\"\nextent = [-1e5, 1e5, -1e5, 1e5]",
+        here,
+        &["nodes"],
+    );
+    let more = "height_scale = 1.0\nextent = [-9.0, 0.0, 0.0, 0.1]";
+    assert_file_refused(&grey(9, 9), more, &["reaches beyond", "-0.160, 0.160"]);
+    let more = "height_scale = 1.0\nextent = [0.1, 0.0, 0.0, 0.1]";
+    assert_file_refused(&grey(9, 9), more, &["not a rectangle"]);
+    let more = "height_scale = 1.0\nextent = [nan, 0.1, 0.0, 0.1]";
+    assert_file_refused(&grey(9, 9), more, &["extent"]);
+}
+
+#[test]
+fn expressions() {
+    let here = Path::new("");
+    let cases: [(&str, &[&str]); 6] = [
+        ("0.1*sin(x", &["character 10", "')'"]),
+        ("z + x", &["\"z\" is unknown", "x and y"]),
+        ("0.1/x", &["inf", "x = 0.0000, y = -3.0000"]),
+        ("sqrt(x)", &["NaN", "x = -3.0000"]),
+        ("1e6*x", &["within"]),
+        ("", &["missing"]),
+    ];
+    for (expression, parts) in cases {
+        assert_refused(
+            &format!("kind = \"formula\"\nexpression = \"{expression}\""),
+            here,
+            parts,
+        );
+    }
+    // Not at a node of the grid but between nodes.
+    let text = "kind = \"formula\"\nexpression = \"0.01/(x - 0.125)\"\nspacing = 0.25";
+    assert_refused(text, here, &["x = 0.1250"]);
+}
+
+#[test]
+fn files_that_are_no_heightmaps() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_refused(
+        MAP,
+        folder.path(),
+        &["\"f\"", "looked for", "scenario's folder"],
+    );
+    fs::create_dir(folder.path().join("f")).unwrap();
+    assert_refused(MAP, folder.path(), &["not a file"]);
+    let scale = "height_scale = 1.0";
+    assert_file_refused(b"", scale, &["\"f\"", "neither a PNG"]);
+    assert_file_refused(b"<svg/>", scale, &["neither a PNG"]);
+    assert_file_refused(&grey(9, 9)[..8], scale, &["not a sound PNG"]);
+}
+
+#[test]
+fn broken_images_at_every_length_and_byte() {
+    let whole = grey(23, 17);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("f");
+    let text = format!("{MAP}height_scale = 1.0");
+    let spec: TerrainSpec = toml::from_str(&text).unwrap();
+    let data_end = whole.len() - 12; // the end chunk
+    for length in (8..data_end - 4).step_by(3) {
+        fs::write(&file, &whole[..length]).unwrap();
+        assert!(
+            refusal(&text, folder.path()).contains("not a sound PNG"),
+            "{length} bytes"
+        );
+    }
+    for i in 8..whole.len() {
+        let mut bytes = whole.clone();
+        bytes[i] ^= 0x55;
+        fs::write(&file, &bytes).unwrap();
+        // Some bytes do not matter; none may panic.
+        let _ = build(&spec, folder.path());
+    }
+}
+
+#[test]
+fn image_sizes_are_judged_from_the_header() {
+    let scale = "height_scale = 1.0";
+    assert_file_refused(
+        &png_header(20_000, 20_000),
+        scale,
+        &["20000 x 20000", "too many"],
+    );
+    assert_file_refused(
+        &png_header(u32::MAX >> 1, u32::MAX >> 1),
+        scale,
+        &["too many"],
+    );
+    assert_file_refused(&grey(1, 1), scale, &["1 x 1", "at least 4 x 4"]);
+    assert_file_refused(&grey(100, 3), scale, &["100 x 3", "at least 4 x 4"]);
+    assert_file_refused(&png_header(0, 4), scale, &["not a sound PNG"]);
+}
+
+#[test]
+fn images_without_data() {
+    let data = [77, 0].repeat(25);
+    let bytes = png(5, 5, &data, png::ColorType::GrayscaleAlpha);
+    assert_file_refused(&bytes, "height_scale = 1.0", &["\"f\"", "without data"]);
+}
+
+#[test]
+fn arrays() {
+    let sound = floats((0..25).map(f64::from));
+    assert_file_refused(
+        &npy("<f8", "(25,)", &sound),
+        "",
+        &["[25]", "two dimensions"],
+    );
+    assert_file_refused(&npy("<f8", "(1, 5, 5)", &sound), "", &["two dimensions"]);
+    assert_file_refused(&npy("<f8", "()", &sound), "", &["two dimensions"]);
+    assert_file_refused(
+        &npy("<c16", "(5, 5)", &sound.repeat(2)),
+        "",
+        &["c16", "floats"],
+    );
+    assert_file_refused(&npy("<U2", "(5, 5)", &sound), "", &["floats"]);
+    assert_file_refused(&npy("|O", "(5, 5)", &sound), "", &["floats"]);
+    assert_file_refused(
+        &npy("<f8", "(5, 5)", &sound[..190]),
+        "",
+        &["not a sound .npy"],
+    );
+    assert_file_refused(&npy("<f8", "(3, 5)", &sound), "", &["at least 4 x 4"]);
+    assert_file_refused(&npy("<f8", "(0, 0)", &[]), "", &["at least 4 x 4"]);
+    assert_file_refused(&npy("<f8", "(20000, 20000)", &[]), "", &["too many"]);
+    assert_file_refused(
+        &npy("<f8", "(9000000000000000000, 9000000000000000000)", &[]),
+        "",
+        &["too many"],
+    );
+    assert_file_refused(b"\x93NUMPY\x01\x00", "", &["not a sound .npy"]);
+    assert_file_refused(
+        b"\x93NUMPY\x02\x00\xff\xff\xff\xff",
+        "",
+        &["not a sound .npy"],
+    );
+    assert_file_refused(&npy("<f8", "(5, 5", &sound), "", &["not a sound .npy"]);
+    let with = |v: f64| {
+        npy(
+            "<f8",
+            "(5, 5)",
+            &floats((0..25).map(|i| if i == 13 { v } else { 0.1 })),
+        )
+    };
+    assert_file_refused(&with(f64::INFINITY), "", &["element [2, 3] is inf"]);
+    assert_file_refused(&with(1e5), "", &["height_scale"]);
+    assert_file_refused(&with(1e300), "", &["height_scale"]);
+    assert_file_refused(&with(1e300), "height_scale = 1000.0", &["height_scale"]);
+    assert_file_refused(&with(f64::MAX), "height_scale = 1000.0", &["f"]);
+    assert_file_refused(
+        &npy("<f8", "(5, 5)", &floats([f64::NAN; 25])),
+        "",
+        &["without data"],
+    );
+    let high = floats((0..25).map(|i| 2e4 + f64::from(i)));
+    assert_file_refused(
+        &npy("<f8", "(5, 5)", &high),
+        "",
+        &["heights must be finite and within"],
+    );
+}

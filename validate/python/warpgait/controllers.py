@@ -1,0 +1,207 @@
+"""The two controllers of the replay: a whole-body quadratic program, and joint PD with feed-forward as a pessimistic second opinion.
+
+Both see a robot model of their own (the planned one) with measured positions and velocities; the simulated robot may differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import daqp
+import mujoco
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from .model import Indices
+from .plan import Array, Bools
+from .reference import Reference
+
+EDGES = 8  # of the pyramid inside the friction cone: 92 % of its width
+
+
+def rotation_error(R: Array) -> Array:
+    """Rotation vector (3,) of a rotation matrix, rad; for angles well below π."""
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    angle = np.arccos(min(1.0, max(-1.0, (R[0, 0] + R[1, 1] + R[2, 2] - 1) / 2)))
+    factor = 0.5 if angle < 1e-6 else angle / (2 * np.sin(angle))
+    result: Array = factor * axis
+    return result
+
+
+def friction_cones(normal: Array, friction: float) -> Array:
+    """Rows (..., EDGES + 1, 3) for normals (..., 3): ν cos(π/EDGES) n − s for directions s around n, then n itself; all ≥ 0 inside."""
+    tx = np.cross([0.0, 1.0, 0.0], normal)
+    tx /= np.linalg.norm(tx, axis=-1, keepdims=True)
+    ty = np.cross(normal, tx)
+    angles = 2 * np.pi * np.arange(EDGES)[:, None] / EDGES
+    around = np.cos(angles) * tx[..., None, :] + np.sin(angles) * ty[..., None, :]
+    inner = friction * np.cos(np.pi / EDGES) * normal[..., None, :]
+    return np.concatenate([inner - around, normal[..., None, :]], axis=-2)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Feedback gains (stiffness 1/s², damping 1/s) and task weights."""
+
+    com: tuple[Array, Array] = (np.array([60.0, 60, 80]), np.array([14.0, 14, 16]))
+    rotation: tuple[Array, Array] = (np.array([150.0, 150, 100]), np.array([22.0, 22, 18]))
+    swing: tuple[float, float] = (350.0, 32.0)
+    stance_damping: float = 20.0
+    weight_com: float = 10.0
+    weight_rotation: float = 10.0
+    weight_swing: float = 5.0
+    weight_stance: float = 50.0
+    weight_force: float = 1e-3
+    weight_acceleration: float = 1e-3
+    least_normal_force: float = 5.0  # N, on feet that do not stick
+    joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
+
+
+class Controller(Protocol):
+    """What the replay asks of a controller."""
+
+    failures: int  # control steps without a solution
+
+    def torque(self, k: int, data: Any, touching: Bools) -> Array:
+        """Motor torques (E, 3) N m at control step k for the measured state in `data` (kinematics and bias up to date)."""
+        ...
+
+
+class WholeBody:
+    """Joint accelerations and stance forces from one quadratic program a step.
+
+    Minimise the weighted misfit of the tasks (centre of mass, trunk orientation, feet) and of the planned forces, subject to the
+    trunk's dynamics, torque limits, friction pyramids and a least normal force.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        index: Indices,
+        reference: Reference,
+        friction: float,
+        pull: Array,
+        preload: Array,
+        gains: Gains | None = None,
+    ) -> None:
+        """`pull` (E,): how hard a foot may pull, N; `preload` (E,): adhesion that friction adds to the normal force, N."""
+        self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
+        self.friction, self.pull, self.preload = friction, pull, preload
+        self.mass = float(model.body_mass.sum())
+        self.failures = 0
+        nv, E = model.nv, len(index.feet)
+        self._M = np.zeros((nv, nv))
+        self._A = np.zeros((6 + 3 * E, nv))
+        self._b = np.zeros(6 + 3 * E)
+        self._A[3:6, 3:6] = np.eye(3)
+        self._contact_jacobian = np.zeros((E, 3, nv))
+        self._jacobian_rate = np.zeros((3, nv))
+        self._cones = friction_cones(reference.normal, friction)
+        self._last = np.zeros((E, 3))
+
+    def _tasks(self, k: int, data: Any, touching: Bools, bias: Array) -> Array:
+        """Fill A q̈ = b for all tasks and return the rows' weights."""
+        ref, g, model, index = self.reference, self.gains, self.model, self.index
+        v = data.qvel
+        # The first three rows of the equations of motion are the total force: m (c̈ − gravity) = M₀ q̈ + bias₀.
+        jacobian = self._M[:3] / self.mass
+        self._A[:3] = jacobian
+        drift = bias[:3] / self.mass + model.opt.gravity
+        error, rate = ref.com[k] - data.subtree_com[index.base], ref.com_velocity[k] - jacobian @ v
+        self._b[:3] = ref.com_acceleration[k] + g.com[0] * error + g.com[1] * rate - drift
+        R = data.xmat[index.base].reshape(3, 3)
+        turn, spin = rotation_error(R.T @ ref.rotation[k]), R.T @ ref.angular_velocity[k] - v[3:6]
+        self._b[3:6] = R.T @ ref.angular_acceleration[k] + g.rotation[0] * turn + g.rotation[1] * spin
+        weights = [g.weight_com] * 3 + [g.weight_rotation] * 3
+        for e in range(len(index.feet)):
+            center = data.site_xpos[index.site[e]]
+            stance = ref.contact[k, e]
+            point = center - index.radius * ref.normal[k, e] if stance else center
+            J = self._contact_jacobian[e]
+            mujoco.mj_jac(model, data, J, None, point, index.body[e])
+            mujoco.mj_jacDot(model, data, self._jacobian_rate, None, point, index.body[e])
+            velocity = J @ v
+            if stance and touching[e]:
+                wanted = -g.stance_damping * velocity
+            else:
+                wanted = g.swing[0] * (ref.foot[k, e] - center) + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
+                if not stance:
+                    wanted = wanted + ref.foot_acceleration[k, e]
+            rows = slice(6 + 3 * e, 9 + 3 * e)
+            self._A[rows] = J
+            self._b[rows] = wanted - self._jacobian_rate @ v
+            weights += [g.weight_stance if stance else g.weight_swing] * 3
+        return np.array(weights)
+
+    def torque(self, k: int, data: Any, touching: Bools) -> Array:
+        """See `Controller.torque`."""
+        ref, g, model, index = self.reference, self.gains, self.model, self.index
+        nv = model.nv
+        mujoco.mj_fullM(model, data, self._M)
+        bias = data.qfrc_bias - data.qfrc_passive
+        weights = self._tasks(k, data, touching, bias)
+        stance = np.flatnonzero(ref.contact[k])
+        n = nv + 3 * len(stance)
+        weighted = self._A * weights[:, None]
+        H, gradient = np.zeros((n, n)), np.zeros(n)
+        H[:nv, :nv] = self._A.T @ weighted
+        H.flat[: nv * (n + 1) : n + 1] += g.weight_acceleration
+        H.flat[nv * (n + 1) :: n + 1] = g.weight_force
+        gradient[:nv] = -(weighted.T @ self._b)
+        gradient[nv:] = -g.weight_force * ref.force[k, stance].ravel()
+
+        motors = index.qvel.ravel()
+        m, rows = len(motors), EDGES + 1
+        J = self._contact_jacobian[stance].reshape(-1, nv)
+        C = np.zeros((6 + m + rows * len(stance), n))
+        lower, upper = np.zeros(len(C)), np.full(len(C), 1e30)
+        C[:6, :nv], C[:6, nv:] = self._M[:6], -J[:, :6].T
+        C[6 : 6 + m, :nv], C[6 : 6 + m, nv:] = self._M[motors], -J[:, motors].T
+        lower[:6] = upper[:6] = -bias[:6]
+        limit = index.torque_limit.ravel()
+        lower[6 : 6 + m], upper[6 : 6 + m] = -limit - bias[motors], limit - bias[motors]
+        for j, e in enumerate(stance):
+            first = 6 + m + rows * j
+            C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cones[k, e]
+            lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
+            lower[first + EDGES] = -self.pull[e] if self.pull[e] > 0 else g.least_normal_force
+        sense = np.zeros(len(C), np.int32)
+        sense[:6] = 5  # equality
+        x, _, flag, _ = daqp.solve(H, gradient, C, upper, lower, sense)
+        if flag < 1 or not np.isfinite(x).all():
+            self.failures += 1
+            return self._last
+        self._last = (C[6 : 6 + m] @ x + bias[motors]).reshape(-1, 3)
+        return self._last
+
+
+class JointPD:
+    """Joint PD around the inverse kinematics of the plan, with the legs' gravity and the planned forces fed forward."""
+
+    def __init__(
+        self, model: Any, index: Indices, reference: Reference, t: Array, joints: Array, gains: Gains | None = None
+    ) -> None:
+        """`joints` (N, E, 3): joint angles at times `t` (N,)."""
+        self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
+        spline = make_interp_spline(t, np.unwrap(joints, axis=0), k=3)
+        self._q, self._v = spline(reference.t), spline(reference.t, 1)
+        self._stiffness, self._damping = np.array(self.gains.joint) * model.body_mass.sum()
+        self._J = np.zeros((3, model.nv))
+        self.failures = 0
+
+    def torque(self, k: int, data: Any, touching: Bools) -> Array:
+        """See `Controller.torque`."""
+        index = self.index
+        q, v = data.qpos[index.qpos], data.qvel[index.qvel]
+        forward = (data.qfrc_bias - data.qfrc_passive)[index.qvel]
+        for e in np.flatnonzero(self.reference.contact[k]):
+            point = data.site_xpos[index.site[e]] - index.radius * self.reference.normal[k, e]
+            mujoco.mj_jac(self.model, data, self._J, None, point, index.body[e])
+            forward[e] -= self._J[:, index.qvel[e]].T @ self.reference.force[k, e]
+        result: Array = np.clip(
+            forward + self._stiffness * (self._q[k] - q) + self._damping * (self._v[k] - v),
+            -index.torque_limit,
+            index.torque_limit,
+        )
+        return result

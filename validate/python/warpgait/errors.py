@@ -1,0 +1,5 @@
+"""Errors that a user can act on."""
+
+
+class InputError(Exception):
+    """Something given to warpgait cannot be used; the message says what, where, and what to do."""

@@ -1,0 +1,99 @@
+"""Closed-form inverse kinematics of a leg with hip abduction (about x), hip flexion and knee flexion (both about y)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+from .model import JOINTS, Array
+
+
+def _wrap(angle: Array) -> Array:
+    """An angle into [-π, π)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One leg, read off the model at zero joint angles. Lengths in m, base frame."""
+
+    name: str
+    hip: Array  # (3,) a point on the HAA axis
+    flexion_offset: float  # HFE before (+x) the HAA point
+    lateral: float  # foot beside (+y) the HAA axis
+    thigh: float  # HFE to KFE, in the leg's plane
+    shank: float  # KFE to the foot's centre, in the leg's plane
+    thigh_zero: float  # rad, from -z towards +x, at zero joint angles
+    shank_zero: float
+    bend: float  # +1: the shank points further forward than the thigh (front legs), -1: the other way
+    lower: Array  # (3,) rad
+    upper: Array  # (3,) rad
+
+    def inverse(self, foot: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Joint angles (..., 3) for foot centres (..., 3) in the base frame, and whether the foot can be there at all.
+
+        Joint limits are not applied. Out of reach, the angles are those of the stretched or folded leg.
+        """
+        v = np.asarray(foot, float) - self.hip
+        # Abduction brings the foot into the plane y = lateral; below the hip, hence the minus sign.
+        drop2 = v[..., 1] ** 2 + v[..., 2] ** 2 - self.lateral**2
+        reachable = drop2 > 1e-8
+        z = -np.sqrt(np.maximum(drop2, 1e-8))
+        haa = _wrap(np.arctan2(v[..., 2], v[..., 1]) - np.arctan2(z, self.lateral))
+        # Two links in the plane.
+        x = v[..., 0] - self.flexion_offset
+        cosine = (x * x + z * z - self.thigh**2 - self.shank**2) / (2 * self.thigh * self.shank)
+        reachable &= np.abs(cosine) <= 1.0
+        knee = self.bend * np.arccos(np.clip(cosine, -1.0, 1.0))
+        thigh = np.arctan2(x, -z) - np.arctan2(self.shank * np.sin(knee), self.thigh + self.shank * np.cos(knee))
+        # A positive rotation about +y turns -z towards -x, so angles count down.
+        hfe = _wrap(self.thigh_zero - thigh)
+        kfe = _wrap(self.shank_zero - self.thigh_zero - knee)
+        return np.stack([haa, hfe, kfe], -1), reachable
+
+    def knee_angle(self, foot: Array) -> Array:
+        """Angle between thigh and shank, rad: 0 stretched, π folded."""
+        q, _ = self.inverse(foot)
+        return np.abs(_wrap(q[..., 2] - (self.shank_zero - self.thigh_zero)))
+
+    def within_limits(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Whether joint angles (..., 3) keep the limits."""
+        ok: npt.NDArray[np.bool_] = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
+        return ok
+
+
+def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
+    """The legs that end in `feet`; refuses a model whose legs are built otherwise."""
+    data = mujoco.MjData(model)
+    data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
+    mujoco.mj_forward(model, data)
+    result = []
+    for name in feet:
+        ids = [model.joint(f"{name}_{j}").id for j in JOINTS]
+        haa, hfe, kfe = (data.xanchor[i].copy() for i in ids)
+        if not np.allclose(data.xaxis[ids], [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=1e-6) or abs(hfe[2] - haa[2]) > 1e-6:
+            raise InputError(f"leg {name}: the inverse kinematics needs joint axes x, y, y at zero joint angles and a level hip")
+        foot = data.site(name).xpos.copy()
+        upper, lower = kfe - hfe, foot - kfe
+        front = haa[0] > 0
+        result.append(
+            Leg(
+                name=name,
+                hip=haa,
+                flexion_offset=float(hfe[0] - haa[0]),
+                lateral=float(foot[1] - haa[1]),
+                thigh=float(np.hypot(upper[0], upper[2])),
+                shank=float(np.hypot(lower[0], lower[2])),
+                thigh_zero=float(np.arctan2(upper[0], -upper[2])),
+                shank_zero=float(np.arctan2(lower[0], -lower[2])),
+                bend=1.0 if front else -1.0,
+                lower=model.jnt_range[ids, 0].copy(),
+                upper=model.jnt_range[ids, 1].copy(),
+            )
+        )
+    return result

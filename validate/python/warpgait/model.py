@@ -1,0 +1,149 @@
+"""Full robot models: where they are found, and what the rest of the package reads off them.
+
+A model is one MJCF file, `robots/NAME.xml`, with a free joint `root`, a body `base`, and for every foot `F` the joints
+`F_HAA`, `F_HFE`, `F_KFE`, motors of the same names, a spherical geom `F` and a site `F` at its centre. A keyframe `stand`
+holds the nominal stance.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+MUJOCO_VERSION = "3.17.0"
+JOINTS = ("HAA", "HFE", "KFE")
+
+
+def check_mujoco() -> None:
+    """Refuse a MuJoCo other than the one that the thresholds were measured with."""
+    if mujoco.__version__ != MUJOCO_VERSION:
+        raise InputError(
+            f"MuJoCo {mujoco.__version__} is installed; the replay is calibrated with {MUJOCO_VERSION}. "
+            f"Run: pip install mujoco=={MUJOCO_VERSION}"
+        )
+
+
+def robots_directories() -> list[Path]:
+    """Where models are looked for: $WARPGAIT_ROBOTS, `models` in an installed package, `robots` above this file or the working folder."""
+    named = [Path(p) for p in os.environ.get("WARPGAIT_ROBOTS", "").split(os.pathsep) if p]
+    here = Path(__file__).resolve()
+    above = [p / "robots" for p in (*here.parents[:4], Path.cwd(), *Path.cwd().parents)]
+    return [*named, *(p for p in (here.parent / "models", *above) if p.is_dir())]
+
+
+def available_models() -> list[str]:
+    """Names of the full models that can be found."""
+    return sorted({f.stem for d in robots_directories() for f in d.glob("*.xml")})
+
+
+def find_model(name: str) -> Path:
+    """The MJCF file of robot `name`, or of the path `name` if it ends in .xml."""
+    if name.endswith(".xml"):
+        if not Path(name).is_file():
+            raise InputError(f"{name}: there is no such model file")
+        return Path(name)
+    for directory in robots_directories():
+        path = directory / f"{name}.xml"
+        if path.is_file():
+            return path
+    known = ", ".join(available_models()) or "none (set WARPGAIT_ROBOTS to the folder that holds them)"
+    raise InputError(
+        f'robot "{name}" has no full model (robots/{name}.xml). Models at hand: {known}. '
+        "Plan for one of these, or name a model to replay on with --model (its mass and legs will differ from the plan's)."
+    )
+
+
+@dataclass(frozen=True)
+class Composite:
+    """The robot frozen in one posture, as one rigid body."""
+
+    mass: float  # kg
+    center_of_mass: Array  # (3,) m, from the base origin, base frame
+    inertia: Array  # (3, 3) kg m², about the centre of mass, base frame
+
+
+@dataclass(frozen=True)
+class Indices:
+    """Where things are in MuJoCo's arrays; feet in the order given."""
+
+    feet: tuple[str, ...]
+    qpos: npt.NDArray[np.intp]  # (E, 3) joint positions
+    qvel: npt.NDArray[np.intp]  # (E, 3) joint velocities
+    actuator: npt.NDArray[np.intp]  # (E, 3) motors
+    geom: list[int]  # (E,) foot spheres
+    site: list[int]  # (E,) foot centres
+    body: list[int]  # (E,) bodies that carry them
+    base: int  # base body
+    radius: float  # m, of the feet
+    torque_limit: Array  # (E, 3) N m
+    speed_limit: float  # rad/s
+    lower: Array  # (E, 3) rad
+    upper: Array  # (E, 3) rad
+
+
+def load_spec(path: Path) -> Any:
+    """The model as an editable `MjSpec`."""
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise InputError(f"{path}: not a usable MJCF model: {error}") from error
+
+
+def foot_names(model: Any) -> tuple[str, ...]:
+    """The feet of a model: its sites, in the order of the file."""
+    return tuple(model.site(i).name for i in range(model.nsite))
+
+
+def indices(model: Any, feet: tuple[str, ...]) -> Indices:
+    """Look up the parts of `feet`, or say which one is missing."""
+    try:
+        joints = [[model.joint(f"{foot}_{j}") for j in JOINTS] for foot in feet]
+        motors = [[model.actuator(f"{foot}_{j}") for j in JOINTS] for foot in feet]
+        geoms = [model.geom(foot).id for foot in feet]
+        return Indices(
+            feet=feet,
+            qpos=np.array([[j.qposadr[0] for j in leg] for leg in joints]),
+            qvel=np.array([[j.dofadr[0] for j in leg] for leg in joints]),
+            actuator=np.array([[m.id for m in leg] for leg in motors]),
+            geom=geoms,
+            site=[model.site(foot).id for foot in feet],
+            body=[int(model.geom_bodyid[g]) for g in geoms],
+            base=model.body("base").id,
+            radius=float(model.geom_size[geoms[0], 0]),
+            torque_limit=np.array([[m.ctrlrange[1] for m in leg] for leg in motors]),
+            speed_limit=float(model.numeric("joint_speed_limit").data[0]),
+            lower=np.array([[j.range[0] for j in leg] for leg in joints]),
+            upper=np.array([[j.range[1] for j in leg] for leg in joints]),
+        )
+    except KeyError as error:
+        raise InputError(f"the robot model lacks a part that the replay needs (feet {', '.join(feet)}): {error}") from error
+
+
+def composite(model: Any, data: Any) -> Composite:
+    """Mass, centre of mass and inertia of the posture in `data` (positions up to date)."""
+    base = model.body("base").id
+    rotation = data.xmat[base].reshape(3, 3)
+    mass = model.body_mass.sum()
+    center = model.body_mass @ data.xipos / mass
+    inertia = np.zeros((3, 3))
+    for b in range(1, model.nbody):
+        R = data.ximat[b].reshape(3, 3)
+        r = data.xipos[b] - center
+        inertia += R @ np.diag(model.body_inertia[b]) @ R.T + model.body_mass[b] * (r @ r * np.eye(3) - np.outer(r, r))
+    return Composite(float(mass), rotation.T @ (center - data.xpos[base]), rotation.T @ inertia @ rotation)
+
+
+def stand(model: Any, data: Any) -> None:
+    """Put `data` into the model's nominal stance."""
+    mujoco.mj_resetDataKeyframe(model, data, model.key("stand").id)
+    mujoco.mj_forward(model, data)

@@ -1,0 +1,259 @@
+"""Plan files, schema 1: one NumPy archive `NAME.plan.npz` that is complete in itself.
+
+World frame: x forward, y left, z up. SI units. N samples, E feet. Quaternions are scalar-first.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+SCHEMA = 1
+
+# Shape of every member that a replay needs: N samples, E feet, R rows along y, C columns along x.
+_FLOATS: dict[str, tuple[str | int, ...]] = {
+    "t": ("N",),
+    "base_position": ("N", 3),
+    "base_quaternion_wxyz": ("N", 4),
+    "base_linear_velocity": ("N", 3),
+    "base_linear_acceleration": ("N", 3),
+    "base_angular_velocity": ("N", 3),
+    "base_angular_acceleration": ("N", 3),
+    "foot_position": ("N", "E", 3),
+    "foot_velocity": ("N", "E", 3),
+    "foot_acceleration": ("N", "E", 3),
+    "foot_force": ("N", "E", 3),
+    "foot_normal": ("N", "E", 3),
+    "heightfield": ("R", "C"),
+    "heightfield_origin": (2,),
+    "heightfield_spacing": (2,),
+}
+_BOOLS: dict[str, tuple[str | int, ...]] = {"foot_contact": ("N", "E"), "foot_adhesive": ("E",)}
+
+
+@dataclass(frozen=True)
+class Heightfield:
+    """Terrain heights on a grid."""
+
+    heights: Array  # (rows along y, columns along x) m
+    origin: Array  # (2,) x, y of element [0, 0], m
+    spacing: Array  # (2,) along x and y, m
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """x_min, x_max, y_min, y_max, m."""
+        rows, columns = self.heights.shape
+        x, y = self.origin
+        return (x, x + (columns - 1) * self.spacing[0], y, y + (rows - 1) * self.spacing[1])
+
+
+@dataclass(frozen=True)
+class PlannedRobot:
+    """The rigid body that was planned for."""
+
+    name: str
+    mass: float  # kg
+    inertia: Array  # (3, 3) about the centre of mass, base frame, kg m²
+    friction: float
+    gravity: Array  # (3,) m/s²
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A plan as read from its file."""
+
+    path: Path
+    t: Array  # (N,) s, uniform from 0
+    base_position: Array  # (N, 3) centre of mass
+    base_quaternion_wxyz: Array  # (N, 4) body to world
+    base_linear_velocity: Array  # (N, 3)
+    base_linear_acceleration: Array  # (N, 3)
+    base_angular_velocity: Array  # (N, 3) world
+    base_angular_acceleration: Array  # (N, 3) world
+    foot_position: Array  # (N, E, 3) contact points
+    foot_velocity: Array  # (N, E, 3)
+    foot_acceleration: Array  # (N, E, 3)
+    foot_force: Array  # (N, E, 3) ground on robot, N
+    foot_contact: Bools  # (N, E) stance
+    foot_normal: Array  # (N, E, 3) of the terrain under the foot
+    foot_names: tuple[str, ...]  # E
+    foot_adhesive: Bools  # (E,)
+    terrain: Heightfield
+    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster or mesh
+    robot: PlannedRobot
+    solved: bool  # every constraint of the NLP holds
+    meta: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def duration(self) -> float:
+        """The horizon, s."""
+        return float(self.t[-1])
+
+    @property
+    def weight(self) -> float:
+        """m g of the planned robot, N."""
+        return self.robot.mass * float(np.linalg.norm(self.robot.gravity))
+
+    @property
+    def pull_limit(self) -> float:
+        """Largest pull of an adhesive foot, share of m g: the scenario's `motion.pull_limit`, or its default."""
+        try:
+            scenario = tomllib.loads(str(self.meta.get("scenario", "")))
+            return float(scenario.get("motion", {}).get("pull_limit", 1.2))
+        except (tomllib.TOMLDecodeError, AttributeError, TypeError, ValueError):
+            return 1.2
+
+
+def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """All arrays of the archive in memory, or a refusal that names the damaged member."""
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    member = ""
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not hasattr(archive, "files"):
+            raise InputError(f"{path}: a single NumPy array, not a plan (an .npz archive)")
+        with archive:
+            for member in archive.files:
+                arrays[member] = archive[member]
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:
+        where = f"member {member}: " if member else ""
+        raise InputError(f"{path}: {where}not readable as a plan (damaged or not an .npz archive): {error}") from error
+    return arrays
+
+
+class _Checker:
+    """Reads members of one archive against the table of shapes."""
+
+    def __init__(self, path: Path, arrays: dict[str, npt.NDArray[Any]]) -> None:
+        self.path, self.arrays = path, arrays
+        self.sizes: dict[str, int] = {}
+
+    def fail(self, member: str, what: str) -> InputError:
+        return InputError(f"{self.path}: member {member}: {what}")
+
+    def take(self, member: str) -> npt.NDArray[Any]:
+        if member not in self.arrays:
+            raise self.fail(member, "is missing")
+        return self.arrays[member]
+
+    def shaped(self, member: str, shape: tuple[str | int, ...]) -> npt.NDArray[Any]:
+        array = self.take(member)
+        if array.ndim == len(shape):
+            for axis, symbol in enumerate(shape):
+                if isinstance(symbol, str):
+                    self.sizes.setdefault(symbol, array.shape[axis])
+        expected = tuple(self.sizes.get(s, -1) if isinstance(s, str) else s for s in shape)
+        if array.shape != expected:
+            names = ", ".join(str(s) for s in shape)
+            raise self.fail(member, f"has shape {array.shape}, expected ({names}) = {expected}".replace("-1", "?"))
+        return array
+
+    def floats(self, member: str, shape: tuple[str | int, ...]) -> Array:
+        array = self.shaped(member, shape)
+        if array.dtype.kind != "f" or array.dtype.itemsize != 8:
+            raise self.fail(member, f"has type {array.dtype}, expected float64")
+        bad = np.argwhere(~np.isfinite(array))
+        if len(bad):
+            raise self.fail(member, f"has a value that is not finite at {bad[0].tolist()}")
+        return array.astype(np.float64)
+
+    def bools(self, member: str, shape: tuple[str | int, ...]) -> Bools:
+        array = self.shaped(member, shape)
+        if array.dtype != np.bool_:
+            raise self.fail(member, f"has type {array.dtype}, expected bool")
+        return array
+
+    def meta(self) -> dict[str, Any]:
+        array = self.take("meta")
+        if array.dtype.kind != "U" or array.ndim != 0:
+            raise self.fail("meta", "expected a string without dimensions")
+        try:
+            meta = json.loads(str(array))
+        except json.JSONDecodeError as error:
+            raise self.fail("meta", f"is not JSON: {error}") from error
+        if not isinstance(meta, dict):
+            raise self.fail("meta", "is not a JSON object")
+        schema = meta.get("schema")
+        if not isinstance(schema, int) or schema < 1:
+            raise self.fail("meta", f"has no usable key schema (found {schema!r})")
+        if schema > SCHEMA:
+            raise self.fail("meta", f"is of schema {schema}; this version reads up to {SCHEMA}: update warpgait")
+        return meta
+
+
+def _robot(check: _Checker, meta: dict[str, Any]) -> PlannedRobot:
+    robot = meta.get("robot")
+    if not isinstance(robot, dict):
+        raise check.fail("meta", "has no object robot")
+    try:
+        result = PlannedRobot(
+            name=str(robot["name"]),
+            mass=float(robot["mass"]),
+            inertia=np.array(robot["inertia"], dtype=float),
+            friction=float(robot["friction"]),
+            gravity=np.array(robot["gravity"], dtype=float),
+        )
+    except KeyError as error:
+        raise check.fail("meta", f"robot has no key {error}") from error
+    except (TypeError, ValueError) as error:
+        raise check.fail("meta", f"robot: {error}") from error
+    numbers = np.concatenate([[result.mass, result.friction], result.inertia.ravel(), result.gravity.ravel()])
+    if result.inertia.shape != (3, 3) or result.gravity.shape != (3,) or not np.isfinite(numbers).all():
+        raise check.fail("meta", "robot: inertia must be 3x3 and gravity a vector of 3, all finite")
+    if result.mass <= 0 or result.friction <= 0 or not result.gravity.any():
+        raise check.fail("meta", "robot: mass, friction and gravity must not vanish")
+    return result
+
+
+def load(path: str | Path) -> Plan:
+    """Read a plan; raises `InputError` with file, member and reason if it cannot be used."""
+    path = Path(path)
+    check = _Checker(path, _members(path))
+    meta = check.meta()
+    names = check.take("foot_names")
+    if names.dtype.kind != "U" or names.ndim != 1 or len(names) == 0:
+        raise check.fail("foot_names", "expected a list of strings")
+    check.sizes["E"] = len(names)
+    values: dict[str, Any] = {m: check.floats(m, s) for m, s in _FLOATS.items()}
+    values |= {m: check.bools(m, s) for m, s in _BOOLS.items()}
+
+    t = values["t"]
+    if len(t) < 3 or abs(t[0]) > 1e-9 or np.ptp(np.diff(t)) > 1e-6 or t[-1] <= 0:
+        raise check.fail("t", "expected at least three uniform times from 0 on")
+    for member in ("base_quaternion_wxyz", "foot_normal"):
+        worst = np.abs(np.linalg.norm(values[member], axis=-1) - 1.0).max()
+        if worst > 1e-6:
+            raise check.fail(member, f"is not of unit length (off by {worst:.2g})")
+    heights = values.pop("heightfield")
+    origin, spacing = values.pop("heightfield_origin"), values.pop("heightfield_spacing")
+    if min(heights.shape) < 2 or (spacing <= 0).any():
+        raise check.fail("heightfield", "needs two rows, two columns and positive spacing")
+    raw = check.floats("heightfield_raw", ("R", "C")) if "heightfield_raw" in check.arrays else None
+
+    solver = meta.get("solver")
+    return Plan(
+        path=path,
+        **values,
+        foot_names=tuple(str(n) for n in names),
+        terrain=Heightfield(heights, origin, spacing),
+        terrain_raw=None if raw is None else Heightfield(raw, origin, spacing),
+        robot=_robot(check, meta),
+        solved=bool(solver.get("success", False)) if isinstance(solver, dict) else False,
+        meta=meta,
+    )

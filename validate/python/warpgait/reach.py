@@ -1,0 +1,111 @@
+"""The reach box of a foot: the largest axis-aligned box inside the set that the leg reaches.
+
+The set is sampled on a grid by closed-form inverse kinematics. A contact point counts as reached when the foot's centre,
+one radius along the terrain's normal, is reached for level ground and for ground tilted four ways.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .kinematics import Leg
+from .model import Array
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ReachRules:
+    """What counts as reached, beyond the joint limits."""
+
+    knee: tuple[float, float] = (0.35, 2.6)  # rad, neither stretched (singular) nor folded
+    flexion: float = float(np.deg2rad(100.0))  # rad, largest |HFE|
+    tilt: float = float(np.deg2rad(30.0))  # rad, of the ground
+    side: float = 0.03  # m, a foot keeps to its own quadrant by this much
+    clearance: float = 0.0  # m, between foot and trunk
+
+
+@dataclass(frozen=True)
+class Box:
+    """Axis-aligned, m."""
+
+    center: Array  # (3,)
+    half_size: Array  # (3,)
+
+
+def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRules) -> Mask:
+    """Whether contact points (..., 3), base frame, m, belong to the reach set of `leg`."""
+    s, c = np.sin(rules.tilt), np.cos(rules.tilt)
+    ok = np.ones(contact.shape[:-1], bool)
+    for normal in ([0, 0, 1], [s, 0, c], [-s, 0, c], [0, s, c], [0, -s, c]):
+        center = contact + radius * np.asarray(normal, float)
+        q, possible = leg.inverse(center)
+        knee = leg.knee_angle(center)
+        ok &= possible & leg.within_limits(q) & (knee >= rules.knee[0]) & (knee <= rules.knee[1])
+        ok &= np.abs(q[..., 1]) <= rules.flexion
+        gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
+        ok &= (gap > 0).any(-1)
+    side = np.sign([leg.hip[0], leg.hip[1]])
+    ok &= (contact[..., 0] * side[0] > rules.side) & (contact[..., 1] * side[1] > rules.side)
+    return ok
+
+
+def largest_rectangle(mask: Mask) -> tuple[int, int, int, int, int]:
+    """Area and bounds (area, i0, i1, j0, j1; inclusive) of the largest all-true rectangle: the histogram-and-stack method, O(cells)."""
+    heights = np.zeros(mask.shape[1], int)
+    best = (0, 0, 0, 0, 0)
+    for i, row in enumerate(mask):
+        heights = np.where(row, heights + 1, 0)
+        stack: list[tuple[int, int]] = []  # (first column, height), heights increasing
+        for j, height in enumerate([*heights.tolist(), 0]):
+            start = j
+            while stack and stack[-1][1] >= height:
+                start, h = stack.pop()
+                if h * (j - start) > best[0]:
+                    best = (h * (j - start), i - h + 1, i, start, j - 1)
+            stack.append((start, height))
+    return best
+
+
+def largest_cuboid(
+    mask: Mask, least: tuple[int, int, int] = (1, 1, 1)
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
+    """First and last index (3,) of the largest all-true cuboid with at least `least` cells an axis; None if there is none.
+
+    Every range of layers is intersected, and the largest rectangle of the intersection taken.
+    """
+    best, bounds = 0, None
+    layers = mask.shape[2]
+    for z0 in range(layers):
+        common = np.ones(mask.shape[:2], bool)
+        for z1 in range(z0, layers):
+            common &= mask[:, :, z1]
+            if common.sum() * (layers - z0) <= best:
+                break
+            thick = z1 - z0 + 1
+            if thick < least[2] or common.sum() * thick <= best:
+                continue
+            area, i0, i1, j0, j1 = largest_rectangle(common)
+            if area * thick > best and i1 - i0 + 1 >= least[0] and j1 - j0 + 1 >= least[1]:
+                best, bounds = area * thick, (np.array([i0, j0, z0]), np.array([i1, j1, z1]))
+    return bounds
+
+
+def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float = 0.01) -> Box:
+    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m.
+
+    Grid points at both ends of the box are reached, so the box is as wide as the points are apart.
+    """
+    reach = leg.thigh + leg.shank + abs(leg.lateral) + radius
+    axes = [np.arange(np.floor((h - reach) / resolution), (h + reach) / resolution) * resolution for h in leg.hip]
+    axes[2] = axes[2][axes[2] < leg.hip[2]]
+    mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
+    cells = np.ceil(least / resolution - 1e-9).astype(int) + 1
+    bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])))
+    if bounds is None:
+        raise ValueError(f"leg {leg.name} reaches no box of {least} m")
+    low, high = (np.array([axis[k] for axis, k in zip(axes, index, strict=True)]) for index in bounds)
+    return Box((low + high) / 2, (high - low) / 2)

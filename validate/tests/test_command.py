@@ -1,0 +1,88 @@
+"""The command: files, exit codes, messages."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import crawl
+from warpgait import film
+from warpgait.validate import main
+
+
+def test_a_good_plan_gives_three_files_and_exit_code_0(
+    standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(standing_plan), "-o", str(tmp_path), "--no-pictures", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    report = json.loads((tmp_path / "stand.report.json").read_text())
+    assert printed == report
+    assert report["verdict"] == "pass" and report["first_failure"] is None
+    assert {t["name"] for t in report["replays"]} == {"closed loop", "second opinion: joint PD"}
+    page = (tmp_path / "stand.report.html").read_text()
+    assert "The robot tracks this plan." in page and "http" not in page.replace("http-equiv", "")
+    with np.load(tmp_path / "stand.replay.npz") as replay:
+        K = len(replay["t"])
+        assert replay["q"].shape == replay["qd"].shape == replay["tau"].shape == (K, 12)
+        assert replay["joint_names"][2] == "LF_KFE"
+        assert np.abs(replay["qd"]).max() < 1.0
+
+
+def test_a_bad_plan_gives_exit_code_1_and_the_reason(
+    standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = crawl.altered(standing_plan, tmp_path / "weak.plan.npz", lambda a: a.update(foot_force=0.5 * a["foot_force"]))
+    assert main([str(bad), "--no-pictures", "--no-second-opinion"]) == 1
+    assert "unexplained force" in capsys.readouterr().out
+    assert json.loads((tmp_path / "weak.report.json").read_text())["trackable"] is False
+
+
+def test_errors_give_exit_code_2_and_a_report_that_says_so(
+    standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path / "none.plan.npz")]) == 2
+    assert "no such file" in capsys.readouterr().err
+
+    def rename(a: dict[str, Any]) -> None:
+        meta = json.loads(str(a["meta"]))
+        meta["robot"]["name"] = "anymal_towr"
+        a["meta"] = np.array(json.dumps(meta))
+
+    other = crawl.altered(standing_plan, tmp_path / "towr.plan.npz", rename)
+    assert main([str(other)]) == 2
+    assert "no full model" in capsys.readouterr().err
+    assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
+    assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
+    assert main([str(standing_plan), "--friction", "-1"]) == 2
+    assert main([str(standing_plan), "--rate", "333"]) == 2
+    assert main([str(standing_plan), "--push", "0,nan,0,0,0"]) == 2
+
+
+def test_without_a_display_or_opengl_the_report_says_what_to_install(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "no-such-backend")
+    assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]) == 0
+    assert "libegl1" in capsys.readouterr().err
+    assert "libegl1" in (tmp_path / "stand.report.html").read_text()
+
+
+def test_without_ffmpeg_a_film_is_refused_kindly(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(film, "ffmpeg", lambda: None)
+    assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion", "--no-pictures", "--video"]) == 0
+    assert "ffmpeg" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_a_missing_mujoco_is_a_message(standing_plan: Path, tmp_path: Path) -> None:
+    (tmp_path / "mujoco.py").write_text("raise ImportError('No module named mujoco')")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from warpgait.validate import main; sys.exit(main([{str(standing_plan)!r}, '-o', {str(tmp_path)!r}]))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install" in done.stderr and "Traceback" not in done.stderr

@@ -1,0 +1,95 @@
+"""Plans are read, or refused with file, member and reason."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crawl import altered
+from warpgait import InputError
+from warpgait.plan import load
+from warpgait.reference import sample
+
+
+def test_a_plan_is_read(standing_plan: Path) -> None:
+    plan = load(standing_plan)
+    assert plan.foot_names == ("LF", "RF", "LH", "RH")
+    assert plan.duration == pytest.approx(1.0)
+    assert plan.robot.name == "anymal_b"
+    assert plan.foot_force[:, :, 2].sum(1) == pytest.approx(plan.weight, rel=1e-3)
+    assert plan.pull_limit == 1.2  # the default: its scenario says nothing
+
+
+def poke(member: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    return lambda a: a.__setitem__(member, value(a[member]))
+
+
+def with_nan(array: Any) -> Any:
+    array = array.copy()
+    array.flat[7] = np.nan
+    return array
+
+
+def meta(**changes: Any) -> Callable[[Any], Any]:
+    return lambda text: np.array(json.dumps(json.loads(str(text)) | changes))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda a: a.pop("foot_force"), ["foot_force", "missing"]),
+        (poke("foot_force", with_nan), ["foot_force", "not finite", "[0, 2, 1]"]),
+        (poke("base_position", lambda x: x[:-1]), ["base_position", "shape"]),
+        (poke("base_position", lambda x: x.astype(np.float32)), ["base_position", "float32"]),
+        (poke("foot_contact", lambda x: x.astype(float)), ["foot_contact", "bool"]),
+        (poke("base_quaternion_wxyz", lambda x: 2 * x), ["base_quaternion_wxyz", "unit"]),
+        (poke("t", lambda x: x**2), ["member t", "uniform"]),
+        (poke("heightfield", lambda x: x[:1]), ["heightfield", "two rows"]),
+        (poke("meta", lambda x: np.array("{")), ["meta", "JSON"]),
+        (poke("meta", meta(schema=2)), ["schema 2", "update"]),
+        (poke("meta", meta(schema="one")), ["schema"]),
+        (poke("meta", meta(robot={"name": "anymal_b"})), ["robot", "mass"]),
+        (poke("meta", meta(robot=[])), ["robot"]),
+    ],
+)
+def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: Any, words: list[str]) -> None:
+    bad = altered(standing_plan, tmp_path / "bad.plan.npz", change)
+    with pytest.raises(InputError) as caught:
+        load(bad)
+    for word in ["bad.plan.npz", *words]:
+        assert word in str(caught.value)
+
+
+def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) -> None:
+    whole = standing_plan.read_bytes()
+    for name, content in (
+        ("half", whole[: len(whole) // 2]),
+        ("empty", b""),
+        ("text", b"hello"),
+        ("rot", whole[:2000] + b"x" * 500 + whole[2500:]),
+    ):
+        path = tmp_path / f"{name}.plan.npz"
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=name):
+            load(path)
+    with pytest.raises(InputError, match="no such file"):
+        load(tmp_path / "missing.plan.npz")
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    with pytest.raises(InputError, match="single NumPy array"):
+        load(tmp_path / "array.npy")
+
+
+def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
+    plan = load(ripple_plan)
+    reference = sample(plan, 1.0 / plan.t[1], 0.03)
+    assert np.allclose(reference.com, plan.base_position)
+    assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.foot_normal)
+    assert (reference.contact == plan.foot_contact).all()
+    between = sample(plan, 500.0, 0.03)
+    # The velocity it reports is that of the positions it reports, between the plan's samples too.
+    moved = np.gradient(between.foot, between.t, axis=0)
+    assert np.abs(moved - between.foot_velocity)[2:-2].max() < 0.02
+    assert between.t[-1] == pytest.approx(plan.duration)

@@ -1,0 +1,100 @@
+"""The replay's parts: terrain in its place, forces that add up, adhesion, a robot that falls."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import crawl
+from warpgait.metrics import Verdict
+from warpgait.model import find_model
+from warpgait.openloop import centroidal_residual
+from warpgait.plan import Heightfield, load
+from warpgait.scene import Disturbance, build
+from warpgait.validation import Settings, validate
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+@pytest.mark.parametrize("spacing", [0.02, 0.1])
+def test_the_ground_is_where_the_plan_has_it(spacing: float) -> None:
+    x, y = np.arange(-1, 1.5, spacing), np.arange(-0.8, 0.4, spacing)
+    heights = crawl.ripple(x[None, :], y[:, None]) - 0.3
+    terrain = Heightfield(heights, np.array([x[0], y[0]]), np.array([spacing, spacing]))
+    world = build(find_model("anymal_c"), terrain, 0.6, GRAVITY)
+    data = mujoco.MjData(world)
+    data.qpos[2] = 50.0
+    mujoco.mj_forward(world, data)
+    hit = np.zeros(1, np.int32)
+    for p in np.random.default_rng(0).uniform([-0.9, -0.7], [1.3, 0.3], (100, 2)):
+        down = mujoco.mj_ray(world, data, np.array([*p, 5.0]), np.array([0.0, 0.0, -1.0]), None, 1, -1, hit, None)
+        assert 5.0 - down == pytest.approx(crawl.ripple(*p) - 0.3, abs=2e-3)
+
+
+def test_forces_of_a_standing_robot_carry_its_weight(standing_plan: Path) -> None:
+    found = validate(load(standing_plan), Settings(second_opinion=False))
+    assert found.verdict is Verdict.PASS
+    force = found.trials[0].replay.force[100:].sum(1).mean(0)
+    assert force == pytest.approx([0, 0, found.plan.weight], abs=0.01 * found.plan.weight)
+
+
+def test_the_plans_own_laws_hold_and_a_wrong_spin_is_seen(ripple_plan: Path) -> None:
+    plan = load(ripple_plan)
+    assert np.abs(centroidal_residual(plan)).max() < 0.01 * plan.weight
+    shaken = plan.base_quaternion_wxyz.copy()
+    angle = 0.02 * np.sin(2 * np.pi * 2.0 * plan.t)  # a 2 Hz roll that no force explains
+    shaken[:, 1] += angle / 2
+    shaken /= np.linalg.norm(shaken, axis=1, keepdims=True)
+    plan = replace(plan, base_quaternion_wxyz=shaken)
+    expected = plan.robot.inertia[0, 0] * 0.02 * (2 * np.pi * 2.0) ** 2
+    assert np.abs(centroidal_residual(plan)[:, 3]).max() == pytest.approx(expected, rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def steep_plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Standing on 45° with friction 0.6: impossible without adhesion."""
+    path = tmp_path_factory.mktemp("plans") / "steep.plan.npz"
+    return crawl.make(path, height=crawl.slope(45.0), steps=0, tilt=np.deg2rad(45.0), adhesive=("LF", "RF"))
+
+
+def test_adhesive_feet_hold_on_a_slope_where_others_slide(steep_plan: Path, tmp_path: Path) -> None:
+    plan = load(steep_plan)
+    found = validate(plan, Settings(second_opinion=False))
+    assert found.trials[0].verdict is Verdict.PASS, [m for m in found.trials[0].metrics if m.verdict]
+    total = found.trials[0].replay.force[100:].sum(1).mean(0)  # with the adhesion taken off, what is left carries the weight
+    assert total == pytest.approx([0, 0, plan.weight], abs=0.02 * plan.weight)
+
+    plain = crawl.altered(steep_plan, tmp_path / "plain.plan.npz", lambda a: a.update(foot_adhesive=np.zeros(4, bool)))
+    assert validate(load(plain), Settings(second_opinion=False)).verdict is Verdict.FAIL
+
+
+def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan: Path) -> None:
+    push = (0.4, 0.5, 0.0, 900.0, 0.0)
+    found = validate(load(standing_plan), Settings(second_opinion=False, disturbance=Disturbance(push=push)))
+    assert found.verdict is Verdict.FAIL
+    first = found.first_failure
+    assert first is not None and 0.4 < first.time < 1.0
+
+
+def test_a_simulation_that_blows_up_is_a_failure_not_a_crash(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    disturbance = Disturbance(push=(0.4, 0.1, 0.0, 1e12, 0.0))
+    found = validate(load(standing_plan), Settings(disturbance=disturbance))
+    assert found.verdict is Verdict.FAIL
+    assert found.first_failure is not None and "blew up" in found.first_failure.what
+    assert list(tmp_path.iterdir()) == []  # MuJoCo would leave a log file here
+
+
+def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
+    """The raw heightfield is replayed too, and counts."""
+    plan = load(standing_plan)
+    rough = plan.terrain.heights + 0.03 * np.sign(np.random.default_rng(0).standard_normal(plan.terrain.heights.shape))
+    raw = Heightfield(rough, plan.terrain.origin, plan.terrain.spacing)
+    found = validate(replace(plan, terrain_raw=raw), Settings(second_opinion=False))
+    assert [t.name for t in found.trials] == ["closed loop", "closed loop, raw terrain"]
+    assert found.trials[0].verdict is Verdict.PASS
+    assert found.verdict is not Verdict.PASS
