@@ -157,3 +157,97 @@ fn validate_hands_over_to_python() {
     let (_, out, _) = warpgait(folder.path(), &["--json", "validate", "a.plan.npz"]);
     assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
 }
+
+const FLAT: &str = "\
+horizon = 3.0
+formulation = \"direct\"
+[robot]
+name = \"anymal_towr\"
+[terrain]
+kind = \"flat\"
+extent = [-1.5, 1.5, -1.0, 1.0]
+spacing = 0.05
+[start]
+position = [0.0, 0.0]
+[goal]
+position = [0.3, 0.0]
+";
+
+#[test]
+fn solve_refuses_bad_input_before_computing() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("flat.toml", FLAT);
+    write("malformed.toml", &FLAT.replace("[start]", "[start"));
+    write("unknown.toml", &FLAT.replace("spacing", "spaceing"));
+    write("outside.toml", &FLAT.replace("[0.3, 0.0]", "[9.0, 0.0]"));
+    write("nan.toml", &FLAT.replace("3.0\n", "nan\n"));
+    write("robot.toml", &FLAT.replace("anymal_towr", "anymal_x"));
+    write(
+        "image.toml",
+        &FLAT
+            .replace("kind = \"flat\"", "kind = \"heightmap\"\nfile = \"none.png\"")
+            .replace("extent", "# extent"),
+    );
+    write("cut.plan.npz", "half of a plan");
+    let solve =
+        |arguments: &[&str], parts: &[&str]| refused(folder.path(), &[&["solve"], arguments].concat(), parts);
+    solve(&["none.toml"], &["none.toml"]);
+    solve(&["malformed.toml"], &["malformed.toml:9: not TOML"]);
+    solve(&["unknown.toml"], &["unknown.toml:8: terrain.spaceing: unknown key; did you mean `spacing`?"]);
+    solve(&["outside.toml"], &["outside.toml:12: goal.position: given [9, 0], outside the terrain"]);
+    solve(&["nan.toml"], &["nan.toml:1: horizon: given nan"]);
+    solve(&["robot.toml"], &["anymal_x", "anymal_towr"]);
+    solve(&["flat.toml", "-o", "no/such/a.plan.npz"], &["no/such/a.plan.npz", "cannot be written"]);
+    solve(&["flat.toml", "-o", "."], &["cannot be written"]);
+    solve(&["flat.toml", "--set", "gait.kind=gallop"], &["--set gait.kind=gallop: gait.kind"]);
+    solve(&["flat.toml", "--formulation", "curved"], &["formulation", "\"warped\", \"direct\""]);
+    let (code, out, err) = warpgait(folder.path(), &["solve", "image.toml"]);
+    assert!(code == 2 && out.is_empty() && err.contains("none.png"), "{err}");
+    assert!(!folder.path().join("image.plan.npz").exists());
+}
+
+#[test]
+fn solve_writes_a_plan_that_checks() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("flat.toml"), FLAT).unwrap();
+    let (code, out, err) = warpgait(folder.path(), &["solve", "flat.toml", "--json", "--plot=drawing.svg"]);
+    assert_eq!(code, 0, "{out}{err}");
+    let object: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&object["solved"], &object["passed"]), (&Value::Bool(true), &Value::Bool(true)));
+    assert_eq!(files(folder.path()), ["drawing.svg", "flat.plan.npz", "flat.toml"]);
+    let plan = warpgait::plan::Plan::read(&folder.path().join("flat.plan.npz")).unwrap();
+    assert!(
+        plan.meta.scenario == FLAT
+            && plan.meta.checks.len() > 20
+            && plan.meta.inputs.contains_key("flat.toml")
+    );
+    assert_eq!(warpgait(folder.path(), &["check", "flat.plan.npz", "--quiet"]).0, 0);
+
+    // One iteration is not enough: the plan is written all the same, and says so.
+    let few = ["solve", "flat.toml", "--set", "solver.max_iterations=1", "-o", "few.plan.npz"];
+    let (code, out, _) = warpgait(folder.path(), &few);
+    assert!(code == 1 && out.contains("NOT SOLVED"), "{out}");
+    let plan = warpgait::plan::Plan::read(&folder.path().join("few.plan.npz")).unwrap();
+    assert!(!plan.meta.solver.success);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_solve_writes_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("flat.toml"), FLAT).unwrap();
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("warpgait"))
+        .current_dir(folder.path())
+        // A tolerance that cannot be met keeps it busy.
+        .args(["solve", "flat.toml", "--quiet", "--set", "solver.tolerance=1e-12", "--set", "horizon=30"])
+        .args(["--set", "solver.effort=optimal", "--set", "solver.max_iterations=100000"])
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    let id = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let plan = warpgait::plan::Plan::read(&folder.path().join("flat.plan.npz")).unwrap();
+    assert!(!plan.meta.solver.success && plan.meta.scenario.contains("max_iterations"));
+}

@@ -123,10 +123,10 @@ fn raster(axes: &Axes, ground: &GroundGrid) -> Vec<Option<f64>> {
     rows.map(|(i, j)| height(ground, at(axes.x, i), at(axes.y, j))).collect()
 }
 
-/// Least and greatest height within the frame; at least 1 cm apart, so that flat ground shows no noise.
+/// Least and greatest height within the frame; at least 10 cm apart, so that flat ground shows no noise.
 fn height_range(raster: &[Option<f64>]) -> [f64; 2] {
     let [low, high] = range(raster.iter().flatten().copied(), 0.0);
-    if high - low >= 0.01 { [low, high] } else { [low - 0.005, low + 0.005] }
+    if high - low >= 0.1 { [low, high] } else { [0.5 * (low + high) - 0.05, 0.5 * (low + high) + 0.05] }
 }
 
 /// Height as bands of colour: cells of one level are drawn as one strip.
