@@ -52,6 +52,8 @@ class Gains:
     rotation: tuple[float, float] = (20.0, 9.0)
     swing: tuple[float, float] = (350.0, 32.0)
     stance_damping: float = 20.0
+    reach_down: float = 0.01  # m
+    touch_force: float = 20.0  # N, normal, the most that is asked of a foot in the air
     weight_com: float = 100.0
     weight_rotation: float = 5.0
     weight_swing: float = 5.0
@@ -129,9 +131,9 @@ class WholeBody:
             if stance and touching[e]:
                 wanted = -g.stance_damping * velocity
             else:
-                wanted = g.swing[0] * (ref.foot[k, e] - center) + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
-                if not stance:
-                    wanted = wanted + ref.foot_acceleration[k, e]
+                # A foot that should stand but does not touch yet reaches for the ground, a little below the plan's.
+                target = ref.foot[k, e] - g.reach_down * ref.contact[k, e] * ref.normal[k, e]
+                wanted = ref.foot_acceleration[k, e] + g.swing[0] * (target - center) + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
             rows = slice(6 + 3 * e, 9 + 3 * e)
             self._A[rows] = J
             self._b[rows] = wanted - self._jacobian_rate @ v
@@ -169,6 +171,8 @@ class WholeBody:
             first = 6 + m + rows * j
             C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cones[k, e]
             lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
+            if not touching[e]:  # to count on a force that is not there would throw the leg
+                upper[first + EDGES] = g.touch_force
             lower[first + EDGES] = -self.pull[e] if self.pull[e] > 0 else g.least_normal_force
         sense = np.zeros(len(C), np.int32)
         sense[:6] = 5  # equality
