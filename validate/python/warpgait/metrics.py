@@ -79,6 +79,7 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
     metrics = [
         Metric(layer, "postures out of reach", float(result.unreachable.sum()), "", 0, 0),
         Metric(layer, "postures past a joint limit", float(result.beyond_limits.sum()), "", 0, 0),
+        Metric(layer, "postures with other parts in the ground", float(len(result.in_ground)), "", 0, 0),
         Metric(layer, "plan: unexplained force, rms", 100 * _rms(result.plan_residual[:, :3]) / mg, "% m g", 1, 5),
         Metric(
             layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 1, 5
@@ -93,8 +94,8 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
     incidents = []
     force, torque = np.linalg.norm(result.plan_residual[:, :3], axis=1), np.linalg.norm(result.plan_residual[:, 3:], axis=1)
     for metric, course, scale, what in (
-        (metrics[2], force, mg, "the planned forces do not explain the motion of the centre of mass"),
-        (metrics[3], torque, mg * LEVER, "the planned forces do not explain the rotation"),
+        (metrics[3], force, mg, "the planned forces do not explain the motion of the centre of mass"),
+        (metrics[4], torque, mg * LEVER, "the planned forces do not explain the rotation"),
     ):
         if metric.verdict is not Verdict.PASS:
             incidents.append(Incident(float(plan.t[np.argmax(100 * course / scale > metric.passes)]), f"open loop: {what}"))
@@ -107,6 +108,10 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
         at = _first(flags)
         if at:
             incidents.append(Incident(float(plan.t[at[0]]), f"open loop: {what}", plan.foot_names[at[1]]))
+    if result.in_ground:
+        k, body = result.in_ground[0]
+        foot = next((f for f in plan.foot_names if body.startswith(f)), None)
+        incidents.append(Incident(float(plan.t[k]), f"open loop: {body} is in the ground", foot))
     return metrics, incidents
 
 

@@ -24,6 +24,7 @@ class OpenLoop:
     rolling: Rolling  # of the feet in these postures
     unreachable: Bools  # (N, E) no joint angles put the foot there
     beyond_limits: Bools  # (N, E) only with a joint past its limit
+    in_ground: list[tuple[int, str]]  # sample and body of every posture with a part other than a foot in the ground
     plan_residual: Array  # (N, 6) force N and torque about the centre of mass N m that the centroidal plan leaves unexplained
     body_residual: Array  # (N, 6) the same for the full body
     torque: Array  # (N, E, 3) N m
@@ -93,8 +94,26 @@ def centroidal_residual(plan: Plan) -> Array:
     return residual
 
 
-def analyse(plan: Plan, model: Any, index: Indices) -> OpenLoop:
-    """Inverse kinematics and inverse dynamics along the plan. `model` needs no terrain; contacts are switched off."""
+def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, str]]:
+    """Which postures (N, nq) put a part other than a foot into the ground of `world` by more than a millimetre: (sample, body)."""
+    data = mujoco.MjData(world)
+    ground, feet = world.geom("ground").id, set(index.geom)
+    found = []
+    for k in range(len(qpos)):
+        data.qpos[:] = qpos[k]
+        mujoco.mj_kinematics(world, data)
+        mujoco.mj_collision(world, data)
+        for contact in range(data.ncon):
+            pair = data.contact.geom[contact]
+            other = int(pair[1] if pair[0] == ground else pair[0])
+            if other not in feet and data.contact.dist[contact] < -1e-3:
+                found.append((k, world.body(world.geom_bodyid[other]).name))
+                break
+    return found
+
+
+def analyse(plan: Plan, model: Any, world: Any, index: Indices) -> OpenLoop:
+    """Inverse kinematics and inverse dynamics along the plan, of `model` (contacts are switched off), and its way over the ground of `world`."""
     found = postures(plan, model, index, none(plan))
     rolling = roll(plan, found.shank, index.radius)
     found = postures(plan, model, index, rolling)
@@ -124,4 +143,14 @@ def analyse(plan: Plan, model: Any, index: Indices) -> OpenLoop:
         residual[k] = np.r_[force, moment]
         torque[k] = generalized[index.qvel]
     model.opt.disableflags = flags
-    return OpenLoop(qpos, qvel, rolling, found.unreachable, found.beyond_limits, centroidal_residual(plan), residual, torque)
+    return OpenLoop(
+        qpos=qpos,
+        qvel=qvel,
+        rolling=rolling,
+        unreachable=found.unreachable,
+        beyond_limits=found.beyond_limits,
+        in_ground=parts_in_ground(world, index, qpos),
+        plan_residual=centroidal_residual(plan),
+        body_residual=residual,
+        torque=torque,
+    )

@@ -119,23 +119,23 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     if not 50 <= settings.rate <= 500 or abs(500 / settings.rate - round(500 / settings.rate)) > 1e-9:
         raise InputError(f"--rate {settings.rate:g}: the control rate must be 500 Hz divided by a whole number, and at least 50")
 
-    say("open loop")
-    analysis = analyse(plan, own, index)
-    metrics, incidents = open_loop(plan, analysis, index)
     pull, preload, strength = _adhesion(plan)
     adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
 
     def world_on(terrain: Heightfield) -> Any:
         return build(path, terrain, plan.robot.friction, plan.robot.gravity, adhesive, strength, settings.disturbance)
 
+    say("open loop")
+    world = world_on(plan.terrain)
+    world_index = indices(world, plan.foot_names)
+    analysis = analyse(plan, own, world, world_index)
+    metrics, incidents = open_loop(plan, analysis, index)
     fine = sample(plan, PD_RATE, index.radius, analysis.rolling)
     coarse = sample(plan, settings.rate, index.radius, analysis.rolling)
 
     def whole_body() -> WholeBody:
         return WholeBody(own, index, coarse, plan.robot.friction, pull, preload)
 
-    world = world_on(plan.terrain)
-    world_index = indices(world, plan.foot_names)
     todo: list[tuple[str, bool, Any, Reference, Any]] = [("closed loop", True, world, coarse, whole_body())]
     if settings.raw and plan.terrain_raw is not None:
         todo.append(("closed loop, raw terrain", True, world_on(plan.terrain_raw), coarse, whole_body()))
