@@ -11,7 +11,11 @@ use crate::scenario::document::Document;
 use crate::{Error, Result};
 
 /// The robots that come with the program: name and content of `robots/NAME.toml`.
-const SHIPPED: &[(&str, &str)] = &[("anymal_towr", include_str!("../robots/anymal_towr.toml"))];
+const SHIPPED: &[(&str, &str)] = &[
+    ("anymal_towr", include_str!("../robots/anymal_towr.toml")),
+    ("anymal_b", include_str!("../robots/anymal_b.toml")),
+    ("anymal_c", include_str!("../robots/anymal_c.toml")),
+];
 
 /// An axis-aligned box in the base frame, origin at the centre of mass, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::robot::Box3;
 
+/// Name, shape, values in C order.
+pub type NamedArray = (String, Vec<usize>, Vec<f64>);
+
 /// A plan in memory. Arrays are flat: `(N, E)` arrays are indexed `n * feet + e`. SI units, world frame.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -49,7 +52,7 @@ pub struct Plan {
     /// Alternating stance and swing durations by foot, s, stance first.
     pub phase_durations: Vec<Vec<f64>>,
     /// Spline coefficients and knots by member name under `spline/`: (name, shape, values in C order).
-    pub splines: Vec<(String, Vec<usize>, Vec<f64>)>,
+    pub splines: Vec<NamedArray>,
     /// The ground as planned on.
     pub ground: GroundGrid,
     /// The warp map's control points, where one was used.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::npz::NpzReader;
-use super::{GroundGrid, MapGrid, Meta, Plan, WarpedSamples};
+use super::{GroundGrid, MapGrid, Meta, NamedArray, Plan, WarpedSamples};
 use crate::Result;
 
 /// The newest plan that this reader knows.
@@ -130,7 +130,7 @@ fn read_phases(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<f64>>> {
     Ok(phases)
 }
 
-fn read_splines(npz: &mut NpzReader) -> Result<Vec<(String, Vec<usize>, Vec<f64>)>> {
+fn read_splines(npz: &mut NpzReader) -> Result<Vec<NamedArray>> {
     let members: Vec<String> = npz.names().into_iter().filter(|name| name.starts_with("spline/")).collect();
     members
         .into_iter()

@@ -127,8 +127,7 @@ mod tests {
     fn ticks_are_round() {
         assert_eq!(ticks([0.0, 10.0], 5), (vec![0.0, 2.0, 4.0, 6.0, 8.0, 10.0], 0));
         let (values, decimals) = ticks([-0.12, 0.31], 4);
-        assert_eq!(decimals, 1);
-        assert!(values.iter().zip([-0.0, 0.2]).all(|(a, b): (&f64, f64)| (a - b).abs() < 0.21), "{values:?}");
+        assert_eq!((values, decimals), (vec![0.0, 0.2], 1));
     }
 
     #[test]
