@@ -66,7 +66,12 @@ impl Bottom {
     pub fn project_adjoint(&self, gradient: &[f64]) -> Vec<f64> {
         let mut inverse = gradient.to_vec();
         self.solve(&mut inverse);
-        let mut out = self.values(&inverse);
+        self.weighted(&self.values(&inverse))
+    }
+
+    /// Values at the Gauss points times their quadrature weights.
+    pub fn weighted(&self, values: &[f64]) -> Vec<f64> {
+        let mut out = values.to_vec();
         for (row, sx) in out
             .chunks_exact_mut(self.y.samples.len())
             .zip(&self.x.samples)
