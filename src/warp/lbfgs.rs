@@ -177,7 +177,7 @@ fn direction(pairs: &VecDeque<Pair>, gradient: &[f64], conditioned: &[f64]) -> V
 }
 
 /// aᵀb, in eight sums so that it can be vectorized.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a, a_rest) = a.as_chunks::<8>();
     let (b, b_rest) = b.as_chunks::<8>();

@@ -10,7 +10,7 @@ use super::assembly::Assembly;
 use super::axis::{Axis, Rule};
 use super::bottom::Bottom;
 use super::density::Density;
-use super::lbfgs::Objective;
+use super::lbfgs::{Objective, dot};
 use super::preconditioner::Preconditioner;
 use crate::Result;
 use crate::heightfield::Heightfield;
@@ -20,8 +20,13 @@ fn weight(z: f64) -> f64 {
     (-z / 0.25).exp() + 0.03
 }
 
-/// Weight of the bottom face against the volume, m.
-const FACE_WEIGHT: f64 = 0.5;
+/// Weight of the bottom face against the volume, m. At 0.5 the mean conformal error at the ground is a quarter larger, at torso
+/// height a thirtieth smaller (medium terrains of the benchmark).
+const FACE_WEIGHT: f64 = 0.7;
+
+/// Weight of the squared misfit that the projection leaves at the bottom, 1/m. Without it the optimizer finds that a steep
+/// place costs least where its points keep away from it (a hill of slope 2 was missed by 139 mm; with it, by 5).
+const MISFIT_WEIGHT: f64 = 1e3;
 
 /// The problem on one grid.
 pub(super) struct Problem<'a, D> {
@@ -67,7 +72,7 @@ impl<'a, D: Density> Problem<'a, D> {
     pub fn seated(&self, map: &WarpMap) -> Vec<f64> {
         let mut u = coefficients_of(map, &self.axes);
         let before = self.face(&u, 2);
-        let ground = self.ground(&u).1;
+        let ground = self.ground(&u).face;
         let nz = self.axes[2].len();
         let third = 2 * u.len() / 3;
         for ((column, ground), before) in u[third..].chunks_exact_mut(nz).zip(ground).zip(before) {
@@ -76,6 +81,17 @@ impl<'a, D: Density> Problem<'a, D> {
             }
         }
         u
+    }
+
+    /// Whether the grid can follow the terrain: the misfit costs less than what bends the map, at a map's seated coefficients.
+    pub fn follows_terrain(&self, map: &WarpMap) -> bool {
+        let u = self.seated(map);
+        let misfit = self.ground(&u).misfit;
+        let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
+        misfit_energy
+            < self
+                .assembly
+                .energy(self.density, &u, &mut vec![0.0; u.len()])
     }
 
     /// The map with these coefficients, on the grid of `map`.
@@ -104,24 +120,39 @@ impl<'a, D: Density> Problem<'a, D> {
             .collect()
     }
 
-    /// φ₀, φ₁ at the Gauss points of the bottom, and the bottom-face coefficients that φ₂ must have there.
-    fn ground(&self, u: &[f64]) -> ([Vec<f64>; 2], Vec<f64>) {
-        let at = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let heights: Vec<f64> = at[0]
+    /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
+    fn ground(&self, u: &[f64]) -> Ground {
+        let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
+        let heights: Vec<f64> = x
             .iter()
-            .zip(&at[1])
+            .zip(&y)
             .map(|(x, y)| self.field.height(*x, *y))
             .collect();
         let face = self.bottom.project(&heights);
-        (at, face)
+        let mut misfit = self.bottom.values(&face);
+        for (m, h) in misfit.iter_mut().zip(&heights) {
+            *m -= h;
+        }
+        Ground { x, y, face, misfit }
     }
+}
+
+/// The bottom face and the terrain under it.
+struct Ground {
+    /// φ₀ and φ₁ at the Gauss points, m.
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// The bottom-face coefficients that φ₂ must have.
+    face: Vec<f64>,
+    /// What the projection leaves: φ₂ − h(φ₀, φ₁) at the Gauss points, m.
+    misfit: Vec<f64>,
 }
 
 impl<D: Density> Objective for Problem<'_, D> {
     fn evaluate(&mut self, u: &mut [f64], gradient: &mut [f64]) -> f64 {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
         let n = nx * ny * nz;
-        let (at, face) = self.ground(u);
+        let Ground { x, y, face, misfit } = self.ground(u);
         for (v, ground) in u[2 * n..].iter_mut().step_by(nz).zip(&face) {
             *v = *ground;
         }
@@ -129,13 +160,17 @@ impl<D: Density> Objective for Problem<'_, D> {
         if !energy.is_finite() {
             return energy;
         }
-        // The eliminated coefficients pass their gradient on by the chain rule.
+        // The eliminated coefficients pass their gradient on by the chain rule. The misfit is orthogonal to the splines, so
+        // that its square depends on φ₀ and φ₁ only through h itself.
+        let weighted = self.bottom.weighted(&misfit);
+        let misfit_energy = MISFIT_WEIGHT * dot(&weighted, &misfit);
         let pull = self.bottom.project_adjoint(&self.face(gradient, 2));
         let mut by_axis = [pull.clone(), pull];
-        for (i, (x, y)) in at[0].iter().zip(&at[1]).enumerate() {
-            let slope = self.field.gradient(*x, *y);
-            by_axis[0][i] *= slope[0];
-            by_axis[1][i] *= slope[1];
+        for i in 0..x.len() {
+            let slope = self.field.gradient(x[i], y[i]);
+            for d in 0..2 {
+                by_axis[d][i] = (by_axis[d][i] - 2.0 * MISFIT_WEIGHT * weighted[i]) * slope[d];
+            }
         }
         for (c, pulled) in by_axis.iter().enumerate() {
             let added = self.bottom.values_adjoint(pulled);
@@ -154,7 +189,7 @@ impl<D: Density> Objective for Problem<'_, D> {
             slab[..nz].fill(0.0);
             slab[(ny - 1) * nz..].fill(0.0);
         }
-        energy
+        energy + misfit_energy
     }
 
     fn precondition(&mut self, v: &mut [f64]) {
