@@ -55,10 +55,10 @@ class Gains:
     reach_down: float = 0.01  # m
     touch_force: float = 20.0  # N, normal, the most that is asked of a foot in the air
     weight_com: float = 100.0
-    weight_rotation: float = 5.0
+    weight_rotation: float = 7.0
     weight_swing: float = 5.0
     weight_stance: float = 50.0
-    weight_force: float = 1e-3
+    weight_force: float = 3e-3
     weight_acceleration: float = 1e-3
     least_normal_force: float = 5.0  # N, on feet that do not stick
     joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
@@ -133,7 +133,11 @@ class WholeBody:
             else:
                 # A foot that should stand but does not touch yet reaches for the ground, a little below the plan's.
                 target = ref.foot[k, e] - g.reach_down * ref.contact[k, e] * ref.normal[k, e]
-                wanted = ref.foot_acceleration[k, e] + g.swing[0] * (target - center) + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
+                wanted = (
+                    ref.foot_acceleration[k, e]
+                    + g.swing[0] * (target - center)
+                    + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
+                )
             rows = slice(6 + 3 * e, 9 + 3 * e)
             self._A[rows] = J
             self._b[rows] = wanted - self._jacobian_rate @ v

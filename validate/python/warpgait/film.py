@@ -22,10 +22,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from .plan import Heightfield
+from .scene import build
 from .validation import Validation
 
 PICTURES, FRAMES_PER_SECOND = 6, 30
-STRIP_SIZE, FILM_SIZE = (480, 270), (1280, 720)  # pixels
+STRIP_SIZE, FILM_SIZE = (480, 270), (640, 360)  # pixels
+CELL, AROUND = 0.05, 1.5  # m: terrain as drawn, and how far around the robot's way
 PACKAGES = "On Debian: apt install libegl1 libgl1-mesa-dri (or libosmesa6) for pictures, and ffmpeg for films."
 
 Image = npt.NDArray[np.uint8]
@@ -58,6 +61,19 @@ def ffmpeg() -> str | None:
         return None
 
 
+def _drawn_terrain(v: Validation) -> Heightfield:
+    """The terrain around the way, coarse: without a GPU a film of half a million triangles takes minutes."""
+    terrain = v.plan.terrain
+    rows, columns = terrain.heights.shape
+    low = v.plan.base_position[:, :2].min(0) - AROUND
+    high = v.plan.base_position[:, :2].max(0) + AROUND
+    first = np.clip(np.floor((low - terrain.origin) / terrain.spacing).astype(int), 0, [columns - 2, rows - 2])
+    last = np.clip(np.ceil((high - terrain.origin) / terrain.spacing).astype(int), first + 1, [columns - 1, rows - 1])
+    every = np.minimum(np.maximum(1, np.floor(CELL / terrain.spacing + 1e-9).astype(int)), last - first)
+    heights = terrain.heights[first[1] : last[1] + 1 : every[1], first[0] : last[0] + 1 : every[0]]
+    return Heightfield(heights, terrain.origin + first * terrain.spacing, every * terrain.spacing)
+
+
 def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int], output: Path, seconds: float) -> None:
     """Render the counted replay at `times` to `output` (an .mp4, or a folder of PNG files), in another process."""
     trial = v.trials[0]
@@ -65,7 +81,8 @@ def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int]
     at = np.minimum(np.searchsorted(r.t, times), len(r.t) - 1)
     with tempfile.TemporaryDirectory() as folder:
         model, frames = Path(folder) / "world.mjb", Path(folder) / "frames.npz"
-        mujoco.mj_saveModel(v.world, str(model), None)
+        world = build(v.model_path, _drawn_terrain(v), v.plan.robot.friction, v.plan.robot.gravity, cell=CELL)
+        mujoco.mj_saveModel(world, str(model), None)
         points = trial.reference.foot[at] - v.index.radius * trial.reference.normal[at]
         np.savez(
             frames, qpos=r.qpos[at], look=trial.reference.com[at], point=points, force=trial.reference.force[at] / v.plan.weight

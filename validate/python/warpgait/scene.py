@@ -51,6 +51,7 @@ def build(
     adhesive: tuple[str, ...] = (),
     adhesion: float = 0.0,
     disturbance: Disturbance | None = None,
+    cell: float = CELL,
 ) -> Any:
     """Compile the MuJoCo model of robot and terrain. Adhesive feet get an actuator `adhesion_FOOT` of strength `adhesion` N."""
     disturbance = disturbance or Disturbance()
@@ -59,7 +60,7 @@ def build(
     spec.option.timestep = TIMESTEP
     spec.option.gravity = gravity
 
-    fine = refine(terrain)
+    fine = refine(terrain, cell)
     pad = np.ceil(MARGIN / fine.spacing).astype(int)
     heights = np.pad(fine.heights, ((pad[1], pad[1]), (pad[0], pad[0])), mode="edge")
     low, high = float(heights.min()), float(heights.max())
