@@ -37,7 +37,7 @@ enum Ending {
 const EXAMPLES: &str = "\
 Examples:
   warpgait init hill                            write hill.toml, a commented scenario
-  warpgait solve hill.toml --plot               plan it: hill.plan.npz and hill.svg
+  warpgait solve hill.toml                      plan it: hill.plan.npz and hill.svg
   warpgait solve hill.toml --set gait.kind=trot --formulation direct -o trot.plan.npz
   warpgait map hill.toml                        build and judge the warp map alone
   warpgait check hill.plan.npz                  recompute every law of a plan

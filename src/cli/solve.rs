@@ -43,9 +43,12 @@ pub(super) struct SolveArguments {
     /// Same as --set formulation=…
     #[arg(long, value_name = "warped|direct")]
     formulation: Option<String>,
-    /// Draw the plan into an SVG file [default: NAME.svg beside the plan]
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
-    plot: Option<Option<PathBuf>>,
+    /// Where the drawing of the plan goes, an SVG file [default: NAME.svg beside the plan]
+    #[arg(long, value_name = "FILE", conflicts_with = "no_plot")]
+    plot: Option<PathBuf>,
+    /// Draw nothing
+    #[arg(long)]
+    no_plot: bool,
     /// Compare the derivatives with differences before solving
     #[arg(long)]
     check_derivatives: bool,
@@ -56,7 +59,8 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     let loaded = load(arguments)?;
     let scenario = &loaded.scenario;
     let output = output(arguments)?;
-    let plot = arguments.plot.clone().map(|file| file.unwrap_or_else(|| beside(&output, ".svg")));
+    let plot =
+        (!arguments.no_plot).then(|| arguments.plot.clone().unwrap_or_else(|| beside(&output, ".svg")));
     for file in [Some(&output), plot.as_ref()].into_iter().flatten() {
         ensure_writable(file)?;
     }
