@@ -4,7 +4,7 @@
 //!   zᵀq − h(q) ≥ base_clearance,  q = p + R b, for points b of the underside
 //! ```
 //!
-//! Rows: every second point of the grid at every `STRIDE`-th sample, m. The whole footprint is looked at by `check`.
+//! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` looks at every sample.
 
 use nalgebra::Vector3;
 
@@ -30,7 +30,7 @@ impl BaseClearance {
     pub fn new(model: &Model, clearance: f64) -> Self {
         let places = (0..=model.layout.intervals)
             .step_by(STRIDE)
-            .flat_map(|k| model.underside.iter().step_by(2).map(move |&b| (k, b)))
+            .flat_map(|k| model.underside.iter().map(move |&b| (k, b)))
             .collect();
         Self { clearance, places }
     }

@@ -21,12 +21,12 @@ pub struct Reach {
 }
 
 /// Taken off the box on each side, m, so that it holds between the samples. Between two samples a path with acceleration a
-/// leaves the line through them by up to a Δt²/8: 0.5 mm for the body at 1.5 m/s², and 12 mm for a foot at 40 m/s².
+/// leaves the line through them by up to a Δt²/8: 0.5 mm for the body at 1.5 m/s², and 15 mm for a foot at 50 m/s².
 const STANDING_MARGIN: f64 = 0.001;
 /// At lift-off and touch-down.
-const SWITCH_MARGIN: f64 = 0.006;
+const SWITCH_MARGIN: f64 = 0.009;
 /// In swing.
-const SWINGING_MARGIN: f64 = 0.012;
+const SWINGING_MARGIN: f64 = 0.015;
 
 fn margin(model: &Model, i: usize, k: usize) -> f64 {
     let layout = &model.layout;
