@@ -262,9 +262,10 @@ impl WarpMap {
                 return wrong(format!("the knots along {axis} do not increase"));
             }
             let expected = |i: usize| grid.origin[d] + (i as f64 - 3.0) * cell[d];
-            if let Some(i) =
-                (0..knots.len()).find(|&i| !((knots[i] - expected(i)).abs() <= 1e-6 * cell[d]))
-            {
+            if let Some(i) = (0..knots.len()).find(|&i| {
+                let off = (knots[i] - expected(i)).abs();
+                off > 1e-6 * cell[d] || off.is_nan()
+            }) {
                 return wrong(format!(
                     "knot {i} along {axis} is {} m where uniform knots from the origin have {} m",
                     knots[i],
@@ -296,6 +297,9 @@ impl WarpMap {
     }
 }
 
+/// About a gigabyte in the optimizer.
+const MAX_CELLS: usize = 1_000_000;
+
 /// Cells, origin and size of the box over a rectangle.
 fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
     let [x_min, x_max, y_min, y_max] = extent;
@@ -309,6 +313,13 @@ fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3]
     if let Some(n) = spec.cells.iter().find(|n| !(4..=512).contains(*n)) {
         return Err(Error::input(format!(
             "map.cells = {:?}: {n} is not between 4 and 512",
+            spec.cells
+        )));
+    }
+    let cells: usize = spec.cells.iter().product();
+    if cells > MAX_CELLS {
+        return Err(Error::input(format!(
+            "map.cells = {:?} makes {cells} cells; more than {MAX_CELLS} would need gigabytes of memory",
             spec.cells
         )));
     }
