@@ -1,10 +1,11 @@
-//! Evaluation of φ: the inner loop of the NLP.
+//! Evaluation of φ, the inner loop of the NLP, and building it.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use std::ops::ControlFlow;
 use warpgait::heightfield::Heightfield;
 use warpgait::scenario::MapSpec;
-use warpgait::warp::{Order, WarpMap};
+use warpgait::warp::{Order, WarpMap, build};
 
 fn evaluation(criterion: &mut Criterion) {
     let height = |x: f64, y: f64| 0.15 * (2.6 * x).sin() * (2.6 * y).sin();
@@ -32,5 +33,21 @@ fn evaluation(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, evaluation);
+fn building(criterion: &mut Criterion) {
+    let k = std::f64::consts::TAU / 2.4;
+    let height = |x: f64, y: f64| Ok(0.15 * (k * x).sin() * (k * y).sin());
+    let field =
+        Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.02, height).expect("a valid terrain");
+    let mut group = criterion.benchmark_group("build");
+    group.sample_size(10);
+    group.bench_function("rippled, medium", |b| {
+        b.iter(|| {
+            build(&field, &MapSpec::default(), &mut |_| {
+                ControlFlow::Continue(())
+            })
+        })
+    });
+}
+
+criterion_group!(benches, evaluation, building);
 criterion_main!(benches);

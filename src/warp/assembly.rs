@@ -6,6 +6,8 @@
 //!
 //! slab (contracted along z) → plane (along x) → row (along y) → ρ, ∂ρ/∂J → back into row, plane, slab.
 
+use std::cmp::Ordering;
+
 use super::axis::{Axis, Rule, Sample};
 use super::density::{Density, determinant};
 use super::lanes::{LANES, Lanes};
@@ -153,9 +155,10 @@ impl Assembly {
                     let jacobian = jacobian_lanes(sy, &plane, blocks, b);
                     let determinants = determinant(&jacobian).0;
                     for (det, sz) in determinants.into_iter().zip(&self.z[b * LANES..]) {
+                        let folds = det.partial_cmp(&0.0) != Some(Ordering::Greater);
                         // The points that only fill the lanes repeat the last one and do not count.
-                        folded += usize::from(!(det > 0.0) && sz.weight != 0.0);
-                        if !(det >= least) {
+                        folded += usize::from(folds && sz.weight != 0.0);
+                        if det < least || det.is_nan() {
                             (least, at) = (det, [sx.at, sy.at, sz.at]);
                         }
                     }

@@ -30,10 +30,15 @@ pub struct MapProgress {
 
 /// On all grids: gᵀHg relative to the energy.
 const TOLERANCE: f64 = 1e-4;
+/// Energies much below this are rounding, m³: over flat ground there is nothing to do.
+const ENERGY_FLOOR: f64 = 1e-9;
 /// On the finest grid. The benchmark's hardest terrain takes 300.
 const MAX_ITERATIONS: usize = 600;
 /// On the grids before it, which need not be done with: what they cannot resolve only keeps them busy.
 const MAX_COARSE_ITERATIONS: usize = 150;
+/// In how many steps ground is grown, and the iterations on each but the last.
+const GROWTH_STEPS: usize = 8;
+const GROWTH_ITERATIONS: usize = 30;
 /// The coarsest grid has at least this many cells along each axis, where the numbers can be halved at all.
 const COARSEST: usize = 8;
 
@@ -99,7 +104,7 @@ fn mips(
     if !report.converged {
         report.warnings.push(format!(
             "the optimizer stopped before its rule was met (gᵀHg is {:.1e} of the energy, wanted {TOLERANCE:.0e}), as happens where the terrain is steeper than its cells can follow; the map could be better",
-            best.1.decrement / best.1.value
+            best.1.decrement / (best.1.value + ENERGY_FLOOR)
         ));
     }
     report.warnings.append(&mut run.notes);
@@ -118,27 +123,23 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn coarse_to_fine(&mut self, spec: &MapSpec, rule: Rule) -> Result<WarpMap> {
-        let mut map = WarpMap::shear(self.field, spec)?;
+        let mut cells = spec.cells;
         let mut halvings = Vec::new();
         loop {
-            let fine = map.cells();
-            let halve = fine.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
-            let cells = std::array::from_fn(|d| if halve[d] { fine[d] / 2 } else { fine[d] });
-            let coarse = WarpMap::shear(
-                self.field,
-                &MapSpec {
-                    cells,
-                    ..spec.clone()
-                },
-            )?;
-            // Stairs on a grid coarser than their treads would be a worse start than the shear.
-            let problem = Problem::new(self.field, Mips, &coarse, rule)?;
-            if halve == [false; 3] || !problem.follows_terrain(&coarse) {
+            let halve = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
+            if halve == [false; 3] {
                 break;
             }
-            map = coarse;
+            cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
             halvings.push(halve);
         }
+        let mut map = WarpMap::shear(
+            self.field,
+            &MapSpec {
+                cells,
+                ..spec.clone()
+            },
+        )?;
         for halve in halvings.into_iter().rev() {
             map = self
                 .minimized(&map, rule, MAX_COARSE_ITERATIONS)?
@@ -147,44 +148,81 @@ impl Run<'_> {
         self.minimized(&map, rule, MAX_ITERATIONS)
     }
 
-    /// The minimizer on the grid of `start`.
+    /// The minimizer on the grid of `start`, the map of a coarser grid.
     fn minimized(&mut self, start: &WarpMap, rule: Rule, iterations: usize) -> Result<WarpMap> {
         let cells = start.cells();
-        let mut problem = Problem::new(self.field, Mips, start, rule)?;
-        let limits = Limits {
-            iterations,
-            tolerance: TOLERANCE,
-        };
-        let progress = &mut *self.progress;
-        let mut report = |iteration, energy, decrement: f64| {
-            progress(MapProgress {
-                cells,
-                iteration,
-                energy,
-                decrement: decrement / energy,
-                tolerance: TOLERANCE,
-            })
-        };
-        let mut u = problem.seated(start);
-        let mut outcome = minimize(&mut problem, &mut u, limits, &mut report);
-        if !outcome.value.is_finite() {
-            // What was fine on the coarser grid is folded on this one. The shear never is.
-            let spec = MapSpec {
+        let shear = WarpMap::shear(
+            self.field,
+            &MapSpec {
                 cells,
                 thickness: start.size()[2],
                 ..MapSpec::default()
-            };
-            u = problem.seated(&WarpMap::shear(self.field, &spec)?);
-            outcome = minimize(&mut problem, &mut u, limits, &mut report);
+            },
+        )?;
+        // What is fine on the coarser grid may fold when it is moved onto the ground that only this one sees: then that
+        // ground is grown in steps. The shear is never folded.
+        for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
+            let mut problem = Problem::new(self.field, Mips, map, rule)?;
+            let mut u = problem.coefficients(map);
+            let gap = problem.gap(&u);
+            let mut outcome = Outcome::default();
+            for step in 1..=steps {
+                problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
+                problem.seat(&mut u);
+                if iterations < MAX_ITERATIONS {
+                    problem.forgive_misfit(&u);
+                }
+                let iterations = if step < steps {
+                    GROWTH_ITERATIONS
+                } else {
+                    iterations
+                };
+                outcome = self.run(&mut problem, &mut u, cells, iterations)?;
+                if !outcome.value.is_finite() {
+                    break;
+                }
+            }
+            if outcome.value.is_finite() {
+                self.outcome.converged = outcome.converged;
+                self.outcome.value = outcome.value;
+                self.outcome.decrement = outcome.decrement;
+                return Ok(problem.to_map(&u, map));
+            }
         }
+        Err(Error::Internal(
+            "the shear onto the terrain is folded".into(),
+        ))
+    }
+
+    /// One run of the optimizer; it is added to what has been spent.
+    fn run(
+        &mut self,
+        problem: &mut Problem<Mips>,
+        u: &mut Vec<f64>,
+        cells: [usize; 3],
+        iterations: usize,
+    ) -> Result<Outcome> {
+        let limits = Limits {
+            iterations,
+            tolerance: TOLERANCE,
+            floor: ENERGY_FLOOR,
+        };
+        let outcome = minimize(problem, u, limits, &mut |iteration, energy, decrement| {
+            (self.progress)(MapProgress {
+                cells,
+                iteration,
+                energy,
+                decrement: decrement / (energy + ENERGY_FLOOR),
+                tolerance: TOLERANCE,
+            })
+        });
         if outcome.interrupted {
             return Err(Error::input(
                 "building the warp map was stopped before it was done",
             ));
         }
-        outcome.iterations += self.outcome.iterations;
-        outcome.evaluations += self.outcome.evaluations;
-        self.outcome = outcome;
-        Ok(problem.to_map(&u, start))
+        self.outcome.iterations += outcome.iterations;
+        self.outcome.evaluations += outcome.evaluations;
+        Ok(outcome)
     }
 }

@@ -15,8 +15,10 @@ pub(super) trait Objective {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub iterations: usize,
-    /// On gᵀHg, relative to the value.
+    /// On gᵀHg, relative to the value plus `floor`.
     pub tolerance: f64,
+    /// Values much below this are as good as zero.
+    pub floor: f64,
 }
 
 /// How it went.
@@ -81,7 +83,7 @@ pub(super) fn minimize(
             outcome.interrupted = true;
             return outcome;
         }
-        if decrement <= limits.tolerance * value {
+        if decrement <= limits.tolerance * (value + limits.floor) {
             outcome.converged = true;
             return outcome;
         }
@@ -238,6 +240,7 @@ mod tests {
         let limits = Limits {
             iterations: 500,
             tolerance: 1e-9,
+            floor: 0.0,
         };
         let outcome = minimize(&mut Valley, &mut x, limits, &mut |_, _, _| {
             ControlFlow::Continue(())
@@ -252,6 +255,7 @@ mod tests {
         let limits = Limits {
             iterations: 500,
             tolerance: 1e-9,
+            floor: 0.0,
         };
         let stop = &mut |iteration, _, _| {
             if iteration < 3 {

@@ -36,6 +36,9 @@ pub(super) struct Problem<'a, D> {
     assembly: Assembly,
     bottom: Bottom,
     preconditioner: Preconditioner,
+    misfit_weight: f64,
+    /// By how much the ground is lower than the terrain for now (bottom-face coefficients, m).
+    lowered: Vec<f64>,
 }
 
 impl<'a, D: Density> Problem<'a, D> {
@@ -65,33 +68,50 @@ impl<'a, D: Density> Problem<'a, D> {
             assembly,
             bottom,
             preconditioner,
+            misfit_weight: MISFIT_WEIGHT,
+            lowered: vec![0.0; nx * ny],
         })
     }
 
-    /// The coefficients of a map, moved up or down as a whole column so that its bottom lies on the ground.
-    pub fn seated(&self, map: &WarpMap) -> Vec<f64> {
-        let mut u = coefficients_of(map, &self.axes);
-        let before = self.face(&u, 2);
-        let ground = self.ground(&u).face;
-        let nz = self.axes[2].len();
-        let third = 2 * u.len() / 3;
-        for ((column, ground), before) in u[third..].chunks_exact_mut(nz).zip(ground).zip(before) {
-            for v in column {
-                *v += ground - before;
-            }
-        }
-        u
+    /// The coefficients of a map, on the grid of this problem.
+    pub fn coefficients(&self, map: &WarpMap) -> Vec<f64> {
+        coefficients_of(map, &self.axes)
     }
 
-    /// Whether the grid can follow the terrain: the misfit costs less than what bends the map, at a map's seated coefficients.
-    pub fn follows_terrain(&self, map: &WarpMap) -> bool {
-        let u = self.seated(map);
-        let misfit = self.ground(&u).misfit;
+    /// How far the ground lies above the bottom face (bottom-face coefficients, m).
+    pub fn gap(&self, u: &[f64]) -> Vec<f64> {
+        let mut gap = self.ground(u).face;
+        for (g, v) in gap.iter_mut().zip(self.face(u, 2)) {
+            *g -= v;
+        }
+        gap
+    }
+
+    /// From here on, the ground is lower than the terrain by a share of `gap`.
+    pub fn lower_ground(&mut self, gap: &[f64], share: f64) {
+        self.lowered = gap.iter().map(|g| share * g).collect();
+    }
+
+    /// Moves the columns over the bottom face up or down, so that it lies on the ground.
+    pub fn seat(&self, u: &mut [f64]) {
+        let gap = self.gap(u);
+        let columns = u.len() / 3 * 2;
+        for (column, gap) in u[columns..].chunks_exact_mut(self.axes[2].len()).zip(gap) {
+            column.iter_mut().for_each(|v| *v += gap);
+        }
+    }
+
+    /// Leaves the misfit out where the grid cannot follow the terrain: where, at these coefficients, it would cost more than
+    /// what bends the map. The terrain is then as smooth as the grid makes it.
+    pub fn forgive_misfit(&mut self, u: &[f64]) {
+        let misfit = self.ground(u).misfit;
         let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
-        misfit_energy
-            < self
-                .assembly
-                .energy(self.density, &u, &mut vec![0.0; u.len()])
+        let energy = self
+            .assembly
+            .energy(self.density, u, &mut vec![0.0; u.len()]);
+        if misfit_energy > energy {
+            self.misfit_weight = 0.0;
+        }
     }
 
     /// The map with these coefficients, on the grid of `map`.
@@ -128,10 +148,13 @@ impl<'a, D: Density> Problem<'a, D> {
             .zip(&y)
             .map(|(x, y)| self.field.height(*x, *y))
             .collect();
-        let face = self.bottom.project(&heights);
+        let mut face = self.bottom.project(&heights);
         let mut misfit = self.bottom.values(&face);
         for (m, h) in misfit.iter_mut().zip(&heights) {
             *m -= h;
+        }
+        for (f, lowered) in face.iter_mut().zip(&self.lowered) {
+            *f -= lowered;
         }
         Ground { x, y, face, misfit }
     }
@@ -163,13 +186,13 @@ impl<D: Density> Objective for Problem<'_, D> {
         // The eliminated coefficients pass their gradient on by the chain rule. The misfit is orthogonal to the splines, so
         // that its square depends on φ₀ and φ₁ only through h itself.
         let weighted = self.bottom.weighted(&misfit);
-        let misfit_energy = MISFIT_WEIGHT * dot(&weighted, &misfit);
+        let misfit_energy = self.misfit_weight * dot(&weighted, &misfit);
         let pull = self.bottom.project_adjoint(&self.face(gradient, 2));
         let mut by_axis = [pull.clone(), pull];
         for i in 0..x.len() {
             let slope = self.field.gradient(x[i], y[i]);
             for d in 0..2 {
-                by_axis[d][i] = (by_axis[d][i] - 2.0 * MISFIT_WEIGHT * weighted[i]) * slope[d];
+                by_axis[d][i] = (by_axis[d][i] - 2.0 * self.misfit_weight * weighted[i]) * slope[d];
             }
         }
         for (c, pulled) in by_axis.iter().enumerate() {
