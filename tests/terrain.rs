@@ -32,11 +32,7 @@ fn write_png(
     if let Some(transparency) = chunks[1] {
         encoder.set_trns(transparency.to_vec());
     }
-    encoder
-        .write_header()
-        .unwrap()
-        .write_image_data(data)
-        .unwrap();
+    encoder.write_header().unwrap().write_image_data(data).unwrap();
 }
 
 /// Without smoothing: at the pixels the field is then the file.
@@ -47,9 +43,7 @@ const PLAIN: &str =
 fn pixels(ground: &Ground) -> Vec<f64> {
     let grid = ground.field.grid();
     assert_eq!([grid.columns, grid.rows], [5, 4]);
-    (0..20)
-        .map(|i| ground.field.height(grid.x(i % 5), grid.y(3 - i / 5)))
-        .collect()
+    (0..20).map(|i| ground.field.height(grid.x(i % 5), grid.y(3 - i / 5))).collect()
 }
 
 #[test]
@@ -66,33 +60,18 @@ fn the_four_of_the_paper_have_the_slopes_of_their_table() {
             let report = ground(&text, Path::new("")).report;
             // The table has two digits; rippled easy and medium are .209 and .393.
             let digits = if kind == "pit" { 0.05 } else { 0.0055 };
-            assert!(
-                (report.largest_slope - slope).abs() < digits,
-                "{text}: {}",
-                report.largest_slope
-            );
-            assert!(
-                report.fit_error_max < 1e-4,
-                "{text}: {:e}",
-                report.fit_error_max
-            );
+            assert!((report.largest_slope - slope).abs() < digits, "{text}: {}", report.largest_slope);
+            assert!(report.fit_error_max < 1e-4, "{text}: {:e}", report.fit_error_max);
         }
     }
 }
 
 #[test]
 fn shapes_follow_their_formulas_and_named_parameters() {
-    let field = ground(
-        "kind = \"rippled\"\nlevel = \"hard\"\nwavelength = 3.0",
-        Path::new(""),
-    )
-    .field;
+    let field = ground("kind = \"rippled\"\nlevel = \"hard\"\nwavelength = 3.0", Path::new("")).field;
     let k = std::f64::consts::TAU / 3.0;
     assert!((field.height(0.31, -1.2) - 0.25 * (k * 0.31).sin() * (k * -1.2).sin()).abs() < 1e-7);
-    assert!(
-        (field.gradient(0.31, -1.2)[0] - 0.25 * k * (k * 0.31).cos() * (k * -1.2).sin()).abs()
-            < 1e-5
-    );
+    assert!((field.gradient(0.31, -1.2)[0] - 0.25 * k * (k * 0.31).cos() * (k * -1.2).sin()).abs() < 1e-5);
     let field = ground("kind = \"conic\"", Path::new("")).field;
     let softplus = |u: f64| u.exp().ln_1p();
     let rho = (0.5_f64 * 0.5 + 1.5 * 1.5 + 0.3 * 0.3).sqrt();
@@ -102,10 +81,7 @@ fn shapes_follow_their_formulas_and_named_parameters() {
     let field = ground("kind = \"pit\"\nlevel = \"easy\"", Path::new("")).field;
     assert!((field.height(1.2, 0.0) + 0.2).abs() < 1e-7);
     assert!((field.height(0.0, 0.0) + 0.2 * (1.0 + 3.0_f64.tanh())).abs() < 1e-7);
-    let flat = ground(
-        "kind = \"flat\"\nextent = [-1.0, 2.0, 0.0, 1.0]",
-        Path::new(""),
-    );
+    let flat = ground("kind = \"flat\"\nextent = [-1.0, 2.0, 0.0, 1.0]", Path::new(""));
     assert_eq!(flat.report.extent, [-1.0, 2.0, 0.0, 1.0]);
     assert_eq!(flat.report.height_range, [0.0, 0.0]);
     assert_eq!(flat.field.jet(0.3, 0.2).d1, [0.0, 0.0]);
@@ -117,33 +93,19 @@ fn the_default_grid_fits_to_micrometres() {
     let ground = ground("kind = \"pit\"\nlevel = \"hard\"", Path::new(""));
     assert_eq!(ground.report.grid, [601, 601]);
     assert_eq!(ground.report.extent, [-3.0, 3.0, -3.0, 3.0]);
-    assert!(
-        ground.report.fit_error_max < 1e-5,
-        "{:e}",
-        ground.report.fit_error_max
-    );
+    assert!(ground.report.fit_error_max < 1e-5, "{:e}", ground.report.fit_error_max);
     assert!(ground.report.fit_error_rms < 1e-6 && ground.report.fit_error_rms > 0.0);
     assert!(ground.report.notes.is_empty());
 }
 
 #[test]
 fn formulas_are_fitted_and_edges_pointed_out() {
-    let smooth = ground(
-        "kind = \"formula\"\nexpression = \"0.3*exp(-x^2 - y^2)\"",
-        Path::new(""),
-    );
+    let smooth = ground("kind = \"formula\"\nexpression = \"0.3*exp(-x^2 - y^2)\"", Path::new(""));
     assert!((smooth.field.height(0.5, 0.1) - 0.3 * (-0.26_f64).exp()).abs() < 1e-8);
     assert!(smooth.report.notes.is_empty());
-    let stairs = ground(
-        "kind = \"formula\"\nexpression = \"0.1*floor(2*x)\"",
-        Path::new(""),
-    );
+    let stairs = ground("kind = \"formula\"\nexpression = \"0.1*floor(2*x)\"", Path::new(""));
     assert!(stairs.report.fit_error_max > 0.02 && stairs.report.largest_slope > 5.0);
-    assert!(
-        stairs.report.notes[0].contains("edge"),
-        "{:?}",
-        stairs.report.notes
-    );
+    assert!(stairs.report.notes[0].contains("edge"), "{:?}", stairs.report.notes);
 }
 
 #[test]
@@ -155,11 +117,7 @@ fn every_flavour_of_png_is_read() {
         write_png(&folder.path().join("map"), [5, 4], format, chunks, data);
         let ground = ground(PLAIN, folder.path());
         for (i, (h, e)) in pixels(&ground).into_iter().zip(expected).enumerate() {
-            assert!(
-                (h - 2.0 * e).abs() < 1e-12,
-                "{what}, pixel {i}: {h} against {}",
-                2.0 * e
-            );
+            assert!((h - 2.0 * e).abs() < 1e-12, "{what}, pixel {i}: {h} against {}", 2.0 * e);
         }
         assert_eq!(ground.report.holes_filled, 0, "{what}");
         assert!(ground.report.fit_error_max < 1e-12);
@@ -174,97 +132,39 @@ fn every_flavour_of_png_is_read() {
     check("grey 16", (Grayscale, Sixteen), [None; 2], &bytes, &from16);
 
     let with_alpha: Vec<u8> = grey.iter().flat_map(|g| [*g, 1]).collect();
-    check(
-        "grey + alpha 8",
-        (GrayscaleAlpha, Eight),
-        [None; 2],
-        &with_alpha,
-        &from8,
-    );
-    let bytes: Vec<u8> = wide
-        .iter()
-        .flat_map(|g| [g.to_be_bytes(), [0, 1]].concat())
-        .collect();
-    check(
-        "grey + alpha 16",
-        (GrayscaleAlpha, Sixteen),
-        [None; 2],
-        &bytes,
-        &from16,
-    );
+    check("grey + alpha 8", (GrayscaleAlpha, Eight), [None; 2], &with_alpha, &from8);
+    let bytes: Vec<u8> = wide.iter().flat_map(|g| [g.to_be_bytes(), [0, 1]].concat()).collect();
+    check("grey + alpha 16", (GrayscaleAlpha, Sixteen), [None; 2], &bytes, &from16);
 
-    let luma = |r: u8, g: u8, b: u8| {
-        (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0
-    };
+    let luma =
+        |r: u8, g: u8, b: u8| (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0;
     let colour = |i: u8| [10 * i, 200 - 7 * i, 3 * i];
     let of_colours: Vec<f64> = (0..20).map(colour).map(|[r, g, b]| luma(r, g, b)).collect();
     let bytes: Vec<u8> = (0..20).flat_map(colour).collect();
     check("colour 8", (Rgb, Eight), [None; 2], &bytes, &of_colours);
-    let bytes: Vec<u8> = (0..20)
-        .flat_map(|i| [colour(i).as_slice(), &[255]].concat())
-        .collect();
-    check(
-        "colour + alpha 8",
-        (Rgba, Eight),
-        [None; 2],
-        &bytes,
-        &of_colours,
-    );
+    let bytes: Vec<u8> = (0..20).flat_map(|i| [colour(i).as_slice(), &[255]].concat()).collect();
+    check("colour + alpha 8", (Rgba, Eight), [None; 2], &bytes, &of_colours);
     // v·257 in 16 bit is v/255.
     let bytes: Vec<u8> = (0..20).flat_map(colour).flat_map(|v| [v, v]).collect();
     check("colour 16", (Rgb, Sixteen), [None; 2], &bytes, &of_colours);
-    let bytes: Vec<u8> = (0..20)
-        .flat_map(|i| [colour(i).as_slice(), &[9]].concat())
-        .flat_map(|v| [v, v])
-        .collect();
-    check(
-        "colour + alpha 16",
-        (Rgba, Sixteen),
-        [None; 2],
-        &bytes,
-        &of_colours,
-    );
+    let bytes: Vec<u8> =
+        (0..20).flat_map(|i| [colour(i).as_slice(), &[9]].concat()).flat_map(|v| [v, v]).collect();
+    check("colour + alpha 16", (Rgba, Sixteen), [None; 2], &bytes, &of_colours);
 
     let palette: Vec<u8> = (0..20).flat_map(colour).collect();
     let indices: Vec<u8> = (0..20).collect();
-    check(
-        "palette 8",
-        (Indexed, Eight),
-        [Some(&palette), None],
-        &indices,
-        &of_colours,
-    );
+    check("palette 8", (Indexed, Eight), [Some(&palette), None], &indices, &of_colours);
     // Two pixels a byte, the rows of five padded to three bytes.
     let indices: Vec<u8> = [[0x01, 0x23, 0x40]; 4].concat();
     let expected: Vec<f64> = (0..20).map(|i| of_colours[i % 5]).collect();
-    check(
-        "palette 4",
-        (Indexed, Four),
-        [Some(&palette[..15]), None],
-        &indices,
-        &expected,
-    );
+    check("palette 4", (Indexed, Four), [Some(&palette[..15]), None], &indices, &expected);
 
     let expected: Vec<f64> = (0..20).map(|i| (i % 5) as f64 / 15.0).collect();
     check("grey 4", (Grayscale, Four), [None; 2], &indices, &expected);
-    let expected: Vec<f64> = (0..20)
-        .map(|i| [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 0.0][i % 5])
-        .collect();
-    check(
-        "grey 2",
-        (Grayscale, Two),
-        [None; 2],
-        &[[0b0001_1011, 0]; 4].concat(),
-        &expected,
-    );
+    let expected: Vec<f64> = (0..20).map(|i| [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 0.0][i % 5]).collect();
+    check("grey 2", (Grayscale, Two), [None; 2], &[[0b0001_1011, 0]; 4].concat(), &expected);
     let expected: Vec<f64> = (0..20).map(|i| [1.0, 0.0, 1.0, 1.0, 0.0][i % 5]).collect();
-    check(
-        "grey 1",
-        (Grayscale, One),
-        [None; 2],
-        &[0b1011_0000; 4],
-        &expected,
-    );
+    check("grey 1", (Grayscale, One), [None; 2], &[0b1011_0000; 4], &expected);
 }
 
 #[test]
@@ -276,12 +176,7 @@ fn transparent_pixels_are_holes_in_every_flavour() {
     let grey = |i: usize| if i == hole { 250 } else { 100 };
     let alpha = |i: usize| if i == hole { 0 } else { 255 };
     let all = 0..20_usize;
-    type Case = (
-        &'static str,
-        (ColorType, BitDepth),
-        [Option<&'static [u8]>; 2],
-        Vec<u8>,
-    );
+    type Case = (&'static str, (ColorType, BitDepth), [Option<&'static [u8]>; 2], Vec<u8>);
     let cases: [Case; 5] = [
         (
             "grey + alpha",
@@ -293,17 +188,13 @@ fn transparent_pixels_are_holes_in_every_flavour() {
             "colour + alpha",
             (Rgba, Eight),
             [None; 2],
-            all.clone()
-                .flat_map(|i| [grey(i), grey(i), grey(i), alpha(i)])
-                .collect(),
+            all.clone().flat_map(|i| [grey(i), grey(i), grey(i), alpha(i)]).collect(),
         ),
         (
             "grey + alpha 16",
             (GrayscaleAlpha, Sixteen),
             [None; 2],
-            all.clone()
-                .flat_map(|i| [grey(i), grey(i), 0, alpha(i)])
-                .collect(),
+            all.clone().flat_map(|i| [grey(i), grey(i), 0, alpha(i)]).collect(),
         ),
         (
             "palette with transparency",
@@ -311,21 +202,13 @@ fn transparent_pixels_are_holes_in_every_flavour() {
             [Some(&[100, 100, 100, 250, 250, 250]), Some(&[255, 0])],
             all.clone().map(|i| u8::from(i == hole)).collect(),
         ),
-        (
-            "a transparent grey",
-            (Grayscale, Eight),
-            [None, Some(&[0, 250])],
-            all.clone().map(grey).collect(),
-        ),
+        ("a transparent grey", (Grayscale, Eight), [None, Some(&[0, 250])], all.clone().map(grey).collect()),
     ];
     for (what, format, chunks, data) in cases {
         write_png(&folder.path().join("map"), [5, 4], format, chunks, &data);
         let ground = ground(PLAIN, folder.path());
         assert_eq!(ground.report.holes_filled, 1, "{what}");
-        assert!(
-            ground.report.notes.iter().any(|n| n.contains("no data")),
-            "{what}"
-        );
+        assert!(ground.report.notes.iter().any(|n| n.contains("no data")), "{what}");
         for h in pixels(&ground) {
             assert!((h - 200.0 / 255.0).abs() < 1e-9, "{what}: {h}");
         }
@@ -337,13 +220,7 @@ fn the_first_row_of_an_image_is_the_largest_y_and_its_origin_the_centre() {
     let folder = tempfile::tempdir().unwrap();
     let mut data = [0; 6 * 4];
     data[0] = 255; // top left: smallest x, largest y
-    write_png(
-        &folder.path().join("map"),
-        [6, 4],
-        (ColorType::Grayscale, BitDepth::Eight),
-        [None; 2],
-        &data,
-    );
+    write_png(&folder.path().join("map"), [6, 4], (ColorType::Grayscale, BitDepth::Eight), [None; 2], &data);
     let ground = ground(&format!("{PLAIN}origin = [1.0, -2.0]"), folder.path());
     let [x_min, x_max, y_min, y_max] = ground.report.extent;
     let expected = [0.95, 1.05, -2.03, -1.97];
@@ -359,8 +236,7 @@ fn the_first_row_of_an_image_is_the_largest_y_and_its_origin_the_centre() {
 /// An `.npy` file of version 1.0, written by hand.
 fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
     let order = if fortran { "True" } else { "False" };
-    let mut header =
-        format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
+    let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
     header += &" ".repeat(64 - (10 + header.len() + 1) % 64);
     header.push('\n');
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -383,59 +259,38 @@ fn arrays_are_read_in_every_type_and_order() {
             "<f8",
             false,
             "(4, 5)",
-            &all.clone()
-                .flat_map(|i| f64::from(value(i)).to_le_bytes())
-                .collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| f64::from(value(i)).to_le_bytes()).collect::<Vec<_>>(),
         ),
         npy(
             ">f4",
             false,
             "(4, 5)",
-            &all.clone()
-                .flat_map(|i| (value(i) as f32).to_be_bytes())
-                .collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (value(i) as f32).to_be_bytes()).collect::<Vec<_>>(),
         ),
         npy(
             "<f8",
             true,
             "(4, 5)",
-            &all.clone()
-                .flat_map(|i| f64::from(fortran(i)).to_le_bytes())
-                .collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| f64::from(fortran(i)).to_le_bytes()).collect::<Vec<_>>(),
         ),
-        npy(
-            "|u1",
-            false,
-            "(4, 5)",
-            &all.clone().map(|i| value(i) as u8).collect::<Vec<_>>(),
-        ),
+        npy("|u1", false, "(4, 5)", &all.clone().map(|i| value(i) as u8).collect::<Vec<_>>()),
         npy(
             "<i2",
             false,
             "(4, 5)",
-            &all.clone()
-                .flat_map(|i| (value(i) as i16).to_le_bytes())
-                .collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (value(i) as i16).to_le_bytes()).collect::<Vec<_>>(),
         ),
         npy(
             "<u4",
             true,
             "(4, 5)",
-            &all.clone()
-                .flat_map(|i| (fortran(i) as u32).to_le_bytes())
-                .collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (fortran(i) as u32).to_le_bytes()).collect::<Vec<_>>(),
         ),
     ];
     for (k, bytes) in files.iter().enumerate() {
         fs::write(&file, bytes).unwrap();
-        for (i, h) in pixels(&ground(PLAIN, folder.path()))
-            .into_iter()
-            .enumerate()
-        {
-            assert!(
-                (h - 2.0 * f64::from(value(i))).abs() < 1e-10,
-                "file {k}, element {i}: {h}"
-            );
+        for (i, h) in pixels(&ground(PLAIN, folder.path())).into_iter().enumerate() {
+            assert!((h - 2.0 * f64::from(value(i))).abs() < 1e-10, "file {k}, element {i}: {h}");
         }
         let metres = ground(&PLAIN.replace("height_scale = 2.0\n", ""), folder.path());
         assert!((pixels(&metres)[3] - f64::from(value(3))).abs() < 1e-10);
@@ -448,44 +303,25 @@ fn arrays_keep_slopes_fill_nan_and_crop() {
     let (columns, rows, spacing) = (51, 41, 0.04);
     let data: Vec<u8> = (0..columns * rows)
         .map(|i| {
-            let (x, y) = (
-                (i % columns) as f64 * spacing,
-                (rows - 1 - i / columns) as f64 * spacing,
-            );
+            let (x, y) = ((i % columns) as f64 * spacing, (rows - 1 - i / columns) as f64 * spacing);
             let hole = (20..27).contains(&(i % columns)) && (10..15).contains(&(i / columns));
             if hole { f64::NAN } else { 0.2 * x - 0.1 * y }
         })
         .flat_map(f64::to_le_bytes)
         .collect();
-    fs::write(
-        folder.path().join("a.npy"),
-        npy("<f8", false, "(41, 51)", &data),
-    )
-    .unwrap();
+    fs::write(folder.path().join("a.npy"), npy("<f8", false, "(41, 51)", &data)).unwrap();
     let text = "kind = \"heightmap\"\nfile = \"a.npy\"\nspacing = 0.04\n";
     let whole = ground(text, folder.path());
     assert_eq!(whole.report.holes_filled, 35);
     assert!((whole.report.smoothing - 0.06).abs() < 1e-12);
     assert_eq!(whole.report.grid, [101, 81]); // refined to 0.02 m
-    assert!(
-        whole.report.fit_error_max < 1e-6,
-        "{:e}",
-        whole.report.fit_error_max
-    );
+    assert!(whole.report.fit_error_max < 1e-6, "{:e}", whole.report.fit_error_max);
     assert!((whole.report.largest_slope - 0.05_f64.sqrt()).abs() < 1e-4);
     assert_eq!(whole.raw.as_ref().unwrap().len(), 101 * 81);
     assert_eq!(whole.inputs[0].0, "a.npy");
     assert_eq!(whole.inputs[0].1.len(), 64);
-    let cropped = ground(
-        &format!("{text}extent = [-0.5, 0.33, -0.2, 0.41]"),
-        folder.path(),
-    );
-    for (a, b) in cropped
-        .report
-        .extent
-        .into_iter()
-        .zip([-0.5, 0.33, -0.2, 0.41])
-    {
+    let cropped = ground(&format!("{text}extent = [-0.5, 0.33, -0.2, 0.41]"), folder.path());
+    for (a, b) in cropped.report.extent.into_iter().zip([-0.5, 0.33, -0.2, 0.41]) {
         assert!((a - b).abs() < 1e-12);
     }
     for (x, y) in [(-0.5, -0.2), (0.33, 0.41), (0.1, 0.1)] {
@@ -497,25 +333,14 @@ fn arrays_keep_slopes_fill_nan_and_crop() {
 fn hashes_are_those_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let grey = [9; 20];
-    write_png(
-        &folder.path().join("map"),
-        [5, 4],
-        (ColorType::Grayscale, BitDepth::Eight),
-        [None; 2],
-        &grey,
-    );
-    let sum = std::process::Command::new("sha256sum")
-        .arg(folder.path().join("map"))
-        .output();
+    write_png(&folder.path().join("map"), [5, 4], (ColorType::Grayscale, BitDepth::Eight), [None; 2], &grey);
+    let sum = std::process::Command::new("sha256sum").arg(folder.path().join("map")).output();
     let Ok(output) = sum else {
         println!("skipped: no sha256sum here");
         return;
     };
     let expected = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(
-        expected.split_whitespace().next().unwrap(),
-        ground(PLAIN, folder.path()).inputs[0].1
-    );
+    assert_eq!(expected.split_whitespace().next().unwrap(), ground(PLAIN, folder.path()).inputs[0].1);
 }
 
 #[test]
@@ -529,11 +354,7 @@ fn the_rubble_is_walkable_ground() {
     assert!(report.holes_filled > 1000);
     assert!(report.height_range[1] - report.height_range[0] > 0.15);
     // Rough: blocks are still there after smoothing. But no cliff.
-    assert!(
-        (0.5..2.5).contains(&report.largest_slope),
-        "{}",
-        report.largest_slope
-    );
+    assert!((0.5..2.5).contains(&report.largest_slope), "{}", report.largest_slope);
     // Half a metre of flat ground at either end, on the line through the middle that a robot would take.
     for k in 0..=50 {
         for j in -10..=10 {
@@ -548,10 +369,7 @@ fn the_rubble_is_walkable_ground() {
 #[test]
 fn terrains_of_peers_are_read() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let candidates: [PathBuf; 2] = [
-        root.join("../shared/terrains"),
-        root.join("../../shared/terrains"),
-    ];
+    let candidates: [PathBuf; 2] = [root.join("../shared/terrains"), root.join("../../shared/terrains")];
     let Some(folder) = candidates.iter().find(|f| f.is_dir()) else {
         println!("skipped: no ../shared/terrains here");
         return;
@@ -563,9 +381,8 @@ fn terrains_of_peers_are_read() {
         ("cpd_slope_1m_1m_20cm.png", 0.02, 0.2),
     ];
     for (file, spacing, scale) in files {
-        let text = format!(
-            "kind = \"heightmap\"\nfile = \"{file}\"\nspacing = {spacing}\nheight_scale = {scale}"
-        );
+        let text =
+            format!("kind = \"heightmap\"\nfile = \"{file}\"\nspacing = {spacing}\nheight_scale = {scale}");
         let report = ground(&text, folder).report;
         println!("{file}: {report:#?}");
         assert!(report.height_range[1] - report.height_range[0] > 0.05);

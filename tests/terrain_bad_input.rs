@@ -20,10 +20,7 @@ fn refusal(text: &str, folder: &Path) -> String {
 fn assert_refused(text: &str, folder: &Path, parts: &[&str]) {
     let message = refusal(text, folder);
     for part in parts {
-        assert!(
-            message.contains(part),
-            "{text}\nsays {message:?}\nwithout {part:?}"
-        );
+        assert!(message.contains(part), "{text}\nsays {message:?}\nwithout {part:?}");
     }
 }
 
@@ -41,11 +38,7 @@ fn png(columns: u32, rows: u32, data: &[u8], color: png::ColorType) -> Vec<u8> {
     let mut encoder = png::Encoder::new(&mut bytes, columns, rows);
     encoder.set_color(color);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder
-        .write_header()
-        .unwrap()
-        .write_image_data(data)
-        .unwrap();
+    encoder.write_header().unwrap().write_image_data(data).unwrap();
     bytes
 }
 
@@ -67,13 +60,7 @@ fn png_header(columns: u32, rows: u32) -> Vec<u8> {
 
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
-            if c & 1 == 1 {
-                (c >> 1) ^ 0xEDB8_8320
-            } else {
-                c >> 1
-            }
-        })
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0xEDB8_8320 } else { c >> 1 })
     })
 }
 
@@ -96,60 +83,22 @@ fn keys_of_another_kind() {
     assert_refused(
         "kind = \"rippled\"\ndepth = 0.5",
         here,
-        &[
-            "terrain.depth",
-            "\"rippled\"",
-            "amplitude",
-            "wavelength",
-            "extent",
-        ],
+        &["terrain.depth", "\"rippled\"", "amplitude", "wavelength", "extent"],
     );
-    assert_refused(
-        "kind = \"flat\"\nlevel = \"easy\"",
-        here,
-        &["terrain.level", "extent, spacing"],
-    );
-    assert_refused(
-        "kind = \"conic\"\nwidth = 1.0",
-        here,
-        &["slope, radius, tip, foot"],
-    );
+    assert_refused("kind = \"flat\"\nlevel = \"easy\"", here, &["terrain.level", "extent, spacing"]);
+    assert_refused("kind = \"conic\"\nwidth = 1.0", here, &["slope, radius, tip, foot"]);
     assert_refused("kind = \"pit\"\nfile = \"a.png\"", here, &["terrain.file"]);
-    assert_refused(
-        "kind = \"formula\"\nexpression = \"x\"\namplitude = 1.0",
-        here,
-        &["terrain.amplitude"],
-    );
-    assert_refused(
-        &format!("{MAP}expression = \"x\""),
-        here,
-        &["terrain.expression", "height_scale"],
-    );
+    assert_refused("kind = \"formula\"\nexpression = \"x\"\namplitude = 1.0", here, &["terrain.amplitude"]);
+    assert_refused(&format!("{MAP}expression = \"x\""), here, &["terrain.expression", "height_scale"]);
 }
 
 #[test]
 fn missing_keys() {
     let here = Path::new("");
-    assert_refused(
-        "kind = \"formula\"",
-        here,
-        &["terrain.expression is missing"],
-    );
-    assert_refused(
-        "kind = \"heightmap\"\nspacing = 0.1",
-        here,
-        &["terrain.file is missing"],
-    );
-    assert_refused(
-        "kind = \"heightmap\"\nfile = \"f\"",
-        here,
-        &["terrain.spacing is missing"],
-    );
-    assert_file_refused(
-        &grey(5, 5),
-        "",
-        &["terrain.height_scale is missing", "black to white"],
-    );
+    assert_refused("kind = \"formula\"", here, &["terrain.expression is missing"]);
+    assert_refused("kind = \"heightmap\"\nspacing = 0.1", here, &["terrain.file is missing"]);
+    assert_refused("kind = \"heightmap\"\nfile = \"f\"", here, &["terrain.spacing is missing"]);
+    assert_file_refused(&grey(5, 5), "", &["terrain.height_scale is missing", "black to white"]);
 }
 
 #[test]
@@ -181,35 +130,16 @@ fn values_out_of_range() {
 #[test]
 fn extents_and_grids() {
     let here = Path::new("");
-    for extent in [
-        "[1.0, 1.0, 0.0, 1.0]",
-        "[1.0, -1.0, 0.0, 1.0]",
-        "[0.0, nan, 0.0, 1.0]",
-        "[-inf, inf, 0.0, 1.0]",
-    ] {
-        assert_refused(
-            &format!("kind = \"hilly\"\nextent = {extent}"),
-            here,
-            &["extent", "x_min < x_max"],
-        );
+    for extent in
+        ["[1.0, 1.0, 0.0, 1.0]", "[1.0, -1.0, 0.0, 1.0]", "[0.0, nan, 0.0, 1.0]", "[-inf, inf, 0.0, 1.0]"]
+    {
+        assert_refused(&format!("kind = \"hilly\"\nextent = {extent}"), here, &["extent", "x_min < x_max"]);
     }
     for spacing in ["0.0", "-0.1", "nan", "inf"] {
-        assert_refused(
-            &format!("kind = \"flat\"\nspacing = {spacing}"),
-            here,
-            &["spacing", "positive"],
-        );
+        assert_refused(&format!("kind = \"flat\"\nspacing = {spacing}"), here, &["spacing", "positive"]);
     }
-    assert_refused(
-        "kind = \"flat\"\nspacing = 1e-5",
-        here,
-        &["nodes", "spacing of at least"],
-    );
-    assert_refused(
-        "kind = \"flat\"\nextent = [-1e5, 1e5, -1e5, 1e5]",
-        here,
-        &["nodes"],
-    );
+    assert_refused("kind = \"flat\"\nspacing = 1e-5", here, &["nodes", "spacing of at least"]);
+    assert_refused("kind = \"flat\"\nextent = [-1e5, 1e5, -1e5, 1e5]", here, &["nodes"]);
     let more = "height_scale = 1.0\nextent = [-9.0, 0.0, 0.0, 0.1]";
     assert_file_refused(&grey(9, 9), more, &["reaches beyond", "-0.160, 0.160"]);
     let more = "height_scale = 1.0\nextent = [0.1, 0.0, 0.0, 0.1]";
@@ -230,11 +160,7 @@ fn expressions() {
         ("", &["missing"]),
     ];
     for (expression, parts) in cases {
-        assert_refused(
-            &format!("kind = \"formula\"\nexpression = \"{expression}\""),
-            here,
-            parts,
-        );
+        assert_refused(&format!("kind = \"formula\"\nexpression = \"{expression}\""), here, parts);
     }
     // Not at a node of the grid but between nodes.
     let text = "kind = \"formula\"\nexpression = \"0.01/(x - 0.125)\"\nspacing = 0.25";
@@ -244,11 +170,7 @@ fn expressions() {
 #[test]
 fn files_that_are_no_heightmaps() {
     let folder = tempfile::tempdir().unwrap();
-    assert_refused(
-        MAP,
-        folder.path(),
-        &["\"f\"", "looked for", "scenario's folder"],
-    );
+    assert_refused(MAP, folder.path(), &["\"f\"", "looked for", "scenario's folder"]);
     fs::create_dir(folder.path().join("f")).unwrap();
     assert_refused(MAP, folder.path(), &["not a file"]);
     let scale = "height_scale = 1.0";
@@ -267,10 +189,7 @@ fn broken_images_at_every_length_and_byte() {
     let data_end = whole.len() - 12; // the end chunk
     for length in (8..data_end - 4).step_by(3) {
         fs::write(&file, &whole[..length]).unwrap();
-        assert!(
-            refusal(&text, folder.path()).contains("not a sound PNG"),
-            "{length} bytes"
-        );
+        assert!(refusal(&text, folder.path()).contains("not a sound PNG"), "{length} bytes");
     }
     for i in 8..whole.len() {
         let mut bytes = whole.clone();
@@ -284,16 +203,8 @@ fn broken_images_at_every_length_and_byte() {
 #[test]
 fn image_sizes_are_judged_from_the_header() {
     let scale = "height_scale = 1.0";
-    assert_file_refused(
-        &png_header(20_000, 20_000),
-        scale,
-        &["20000 x 20000", "too many"],
-    );
-    assert_file_refused(
-        &png_header(u32::MAX >> 1, u32::MAX >> 1),
-        scale,
-        &["too many"],
-    );
+    assert_file_refused(&png_header(20_000, 20_000), scale, &["20000 x 20000", "too many"]);
+    assert_file_refused(&png_header(u32::MAX >> 1, u32::MAX >> 1), scale, &["too many"]);
     assert_file_refused(&grey(1, 1), scale, &["1 x 1", "at least 4 x 4"]);
     assert_file_refused(&grey(100, 3), scale, &["100 x 3", "at least 4 x 4"]);
     assert_file_refused(&png_header(0, 4), scale, &["not a sound PNG"]);
@@ -309,61 +220,27 @@ fn images_without_data() {
 #[test]
 fn arrays() {
     let sound = floats((0..25).map(f64::from));
-    assert_file_refused(
-        &npy("<f8", "(25,)", &sound),
-        "",
-        &["[25]", "two dimensions"],
-    );
+    assert_file_refused(&npy("<f8", "(25,)", &sound), "", &["[25]", "two dimensions"]);
     assert_file_refused(&npy("<f8", "(1, 5, 5)", &sound), "", &["two dimensions"]);
     assert_file_refused(&npy("<f8", "()", &sound), "", &["two dimensions"]);
-    assert_file_refused(
-        &npy("<c16", "(5, 5)", &sound.repeat(2)),
-        "",
-        &["c16", "floats"],
-    );
+    assert_file_refused(&npy("<c16", "(5, 5)", &sound.repeat(2)), "", &["c16", "floats"]);
     assert_file_refused(&npy("<U2", "(5, 5)", &sound), "", &["floats"]);
     assert_file_refused(&npy("|O", "(5, 5)", &sound), "", &["floats"]);
-    assert_file_refused(
-        &npy("<f8", "(5, 5)", &sound[..190]),
-        "",
-        &["not a sound .npy"],
-    );
+    assert_file_refused(&npy("<f8", "(5, 5)", &sound[..190]), "", &["not a sound .npy"]);
     assert_file_refused(&npy("<f8", "(3, 5)", &sound), "", &["at least 4 x 4"]);
     assert_file_refused(&npy("<f8", "(0, 0)", &[]), "", &["at least 4 x 4"]);
     assert_file_refused(&npy("<f8", "(20000, 20000)", &[]), "", &["too many"]);
-    assert_file_refused(
-        &npy("<f8", "(9000000000000000000, 9000000000000000000)", &[]),
-        "",
-        &["too many"],
-    );
+    assert_file_refused(&npy("<f8", "(9000000000000000000, 9000000000000000000)", &[]), "", &["too many"]);
     assert_file_refused(b"\x93NUMPY\x01\x00", "", &["not a sound .npy"]);
-    assert_file_refused(
-        b"\x93NUMPY\x02\x00\xff\xff\xff\xff",
-        "",
-        &["not a sound .npy"],
-    );
+    assert_file_refused(b"\x93NUMPY\x02\x00\xff\xff\xff\xff", "", &["not a sound .npy"]);
     assert_file_refused(&npy("<f8", "(5, 5", &sound), "", &["not a sound .npy"]);
-    let with = |v: f64| {
-        npy(
-            "<f8",
-            "(5, 5)",
-            &floats((0..25).map(|i| if i == 13 { v } else { 0.1 })),
-        )
-    };
+    let with = |v: f64| npy("<f8", "(5, 5)", &floats((0..25).map(|i| if i == 13 { v } else { 0.1 })));
     assert_file_refused(&with(f64::INFINITY), "", &["element [2, 3] is inf"]);
     assert_file_refused(&with(1e5), "", &["height_scale"]);
     assert_file_refused(&with(1e300), "", &["height_scale"]);
     assert_file_refused(&with(1e300), "height_scale = 1000.0", &["height_scale"]);
     assert_file_refused(&with(f64::MAX), "height_scale = 1000.0", &["f"]);
-    assert_file_refused(
-        &npy("<f8", "(5, 5)", &floats([f64::NAN; 25])),
-        "",
-        &["without data"],
-    );
+    assert_file_refused(&npy("<f8", "(5, 5)", &floats([f64::NAN; 25])), "", &["without data"]);
     let high = floats((0..25).map(|i| 2e4 + f64::from(i)));
-    assert_file_refused(
-        &npy("<f8", "(5, 5)", &high),
-        "",
-        &["heights must be finite and within"],
-    );
+    assert_file_refused(&npy("<f8", "(5, 5)", &high), "", &["heights must be finite and within"]);
 }

@@ -26,10 +26,7 @@ fn hilly(height: f64) -> Heightfield {
 }
 
 fn spec(cells: [usize; 3]) -> MapSpec {
-    MapSpec {
-        cells,
-        ..MapSpec::default()
-    }
+    MapSpec { cells, ..MapSpec::default() }
 }
 
 /// What every finished map must hold to, judged by evaluating it and not by its report.
@@ -66,10 +63,7 @@ fn the_medium_ripple_is_as_conformal_as_designed() {
     assert!(report.min_determinant > 0.8 && report.normal_angle.max < 1.0);
     check_map(&map, &field, 1e-4);
     // On the shear, the same measure is several times larger.
-    let shear = MapSpec {
-        method: MapMethod::Shear,
-        ..MapSpec::default()
-    };
+    let shear = MapSpec { method: MapMethod::Shear, ..MapSpec::default() };
     let (map, sheared) = build(&field, &shear, &mut go_on).unwrap();
     assert!(sheared.conformal_ground.mean > 4.0 * report.conformal_ground.mean);
     assert!((sheared.min_determinant - 1.0).abs() < 1e-9);
@@ -81,10 +75,7 @@ fn a_medium_hill_is_met_to_a_millimetre() {
     let field = hilly(1.0);
     let (map, report) = build(&field, &MapSpec::default(), &mut go_on).unwrap();
     assert!(report.converged && report.inverted_points == 0);
-    assert!(
-        report.conformal_ground.mean < 0.027 && report.misfit_max < 1e-3,
-        "{report:?}"
-    );
+    assert!(report.conformal_ground.mean < 0.027 && report.misfit_max < 1e-3, "{report:?}");
     check_map(&map, &field, 1e-3);
 }
 
@@ -94,10 +85,7 @@ fn flat_ground_needs_no_warp() {
     let (map, report) = build(&field, &spec([16, 12, 8]), &mut go_on).unwrap();
     assert_eq!(report.iterations, 0);
     let p = map.position([0.4, -1.3, 0.6]);
-    assert!(
-        (p[0] - 0.4).abs() + (p[1] + 1.3).abs() + (p[2] - 0.8).abs() < 1e-9,
-        "{p:?}"
-    );
+    assert!((p[0] - 0.4).abs() + (p[1] + 1.3).abs() + (p[2] - 0.8).abs() < 1e-9, "{p:?}");
     assert!(report.conformal_ground.max < 1e-9);
 }
 
@@ -107,27 +95,17 @@ fn a_cliff_is_not_folded() {
     let field = terrain(|x, y| -0.45 * (1.0 - ((x * x + y * y - 1.44) / (2.4 * 0.06)).tanh()));
     let (map, report) = build(&field, &spec([32, 32, 8]), &mut go_on).unwrap();
     assert_eq!(report.inverted_points, 0, "{report:?}");
-    assert!(
-        report
-            .warnings
-            .iter()
-            .any(|w| w.contains("misses the terrain")),
-        "{report:?}"
-    );
+    assert!(report.warnings.iter().any(|w| w.contains("misses the terrain")), "{report:?}");
     check_map(&map, &field, 0.06);
 }
 
 #[test]
 fn odd_numbers_of_cells_and_oblong_terrains_work() {
-    let field = Heightfield::from_function([0.0, 4.0, -1.0, 1.5], 0.05, |x, y| {
-        Ok(0.1 * (2.0 * x).sin() + 0.05 * y)
-    })
-    .unwrap();
+    let field =
+        Heightfield::from_function([0.0, 4.0, -1.0, 1.5], 0.05, |x, y| Ok(0.1 * (2.0 * x).sin() + 0.05 * y))
+            .unwrap();
     let (map, report) = build(&field, &spec([25, 17, 9]), &mut go_on).unwrap();
-    assert!(
-        report.converged && report.inverted_points == 0 && report.misfit_max < 1e-3,
-        "{report:?}"
-    );
+    assert!(report.converged && report.inverted_points == 0 && report.misfit_max < 1e-3, "{report:?}");
     let back = map.inverse(map.position([2.2, 0.4, 0.5])).unwrap();
     assert!((back[0] - 2.2).abs() + (back[1] - 0.4).abs() + (back[2] - 0.5).abs() < 1e-9);
 }
@@ -145,25 +123,17 @@ fn progress_falls_and_may_stop_the_work() {
     }
     let last = seen.last().unwrap();
     assert!(last.cells == [24, 24, 8] && last.decrement <= last.tolerance);
-    let stopped = build(&rippled(), &spec([24, 24, 8]), &mut |_| {
-        ControlFlow::Break(())
-    });
+    let stopped = build(&rippled(), &spec([24, 24, 8]), &mut |_| ControlFlow::Break(()));
     assert!(stopped.unwrap_err().to_string().contains("stopped"));
 }
 
 #[test]
 fn methods_that_are_not_there_yet_are_named() {
-    let arap = MapSpec {
-        method: MapMethod::Arap,
-        ..MapSpec::default()
-    };
+    let arap = MapSpec { method: MapMethod::Arap, ..MapSpec::default() };
     let error = build(&rippled(), &arap, &mut go_on).unwrap_err();
     assert!(matches!(error, Error::Input(_)));
     let message = error.to_string();
-    assert!(
-        message.contains("arap") && message.contains("mips"),
-        "{message}"
-    );
+    assert!(message.contains("arap") && message.contains("mips"), "{message}");
 }
 
 #[test]
@@ -172,19 +142,10 @@ fn grids_that_make_no_sense_are_refused() {
         spec([2, 48, 16]),
         spec([48, 48, 100_000]),
         spec([512, 512, 512]),
-        MapSpec {
-            thickness: -1.0,
-            ..MapSpec::default()
-        },
-        MapSpec {
-            thickness: f64::NAN,
-            ..MapSpec::default()
-        },
+        MapSpec { thickness: -1.0, ..MapSpec::default() },
+        MapSpec { thickness: f64::NAN, ..MapSpec::default() },
     ] {
-        assert!(
-            matches!(build(&rippled(), &bad, &mut go_on), Err(Error::Input(_))),
-            "{bad:?}"
-        );
+        assert!(matches!(build(&rippled(), &bad, &mut go_on), Err(Error::Input(_))), "{bad:?}");
     }
 }
 
@@ -200,19 +161,13 @@ fn the_cache_knows_what_a_map_depends_on_and_survives_damage() {
     assert!(!hit);
     let (again, same, hit) = cached(&rippled(), &small, dir.path());
     assert!(hit && again == map);
-    assert_eq!(
-        (same.method, same.iterations),
-        (report.method, report.iterations)
-    );
+    assert_eq!((same.method, same.iterations), (report.method, report.iterations));
     assert!((same.conformal_ground.mean - report.conformal_ground.mean).abs() < 1e-12);
     // Another terrain, another specification.
     assert!(!cached(&hilly(0.3), &small, dir.path()).2);
     assert!(!cached(&rippled(), &spec([12, 12, 9]), dir.path()).2);
     // Damage of any kind is built over.
-    let files: Vec<_> = std::fs::read_dir(dir.path())
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
+    let files: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(files.len(), 3, "{files:?}");
     for file in &files {
         let mut bytes = std::fs::read(file).unwrap();
@@ -235,8 +190,5 @@ fn a_cache_that_cannot_be_written_costs_a_warning_only() {
     let file = dir.path().join("file");
     std::fs::write(&file, b"").unwrap();
     let (_, report, hit) = cached(&rippled(), &spec([12, 12, 8]), &file);
-    assert!(
-        !hit && report.warnings.iter().any(|w| w.contains("kept")),
-        "{report:?}"
-    );
+    assert!(!hit && report.warnings.iter().any(|w| w.contains("kept")), "{report:?}");
 }

@@ -43,22 +43,10 @@ impl Assembly {
         }
         while z.len() % LANES != 0 {
             let last = z[z.len() - 1];
-            z.push(Sample {
-                weight: 0.0,
-                ..last
-            });
+            z.push(Sample { weight: 0.0, ..last });
         }
-        let weight_z = z
-            .chunks_exact(LANES)
-            .map(|s| Lanes(std::array::from_fn(|l| s[l].weight)))
-            .collect();
-        Assembly {
-            axes,
-            x,
-            y,
-            z,
-            weight_z,
-        }
+        let weight_z = z.chunks_exact(LANES).map(|s| Lanes(std::array::from_fn(|l| s[l].weight))).collect();
+        Assembly { axes, x, y, z, weight_z }
     }
 
     /// The points along an axis, with their weights.
@@ -90,35 +78,17 @@ impl Assembly {
                 entered += 1;
             }
             let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(
-                sx,
-                [window(0), window(1), window(2), window(3)],
-                blocks,
-                &mut plane,
-            );
+            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
             plane_gradient.fill(Lanes::ZERO);
             for sy in &self.y {
                 let weight = sx.weight * sy.weight;
-                energy += row(
-                    density,
-                    sy,
-                    weight,
-                    &self.weight_z,
-                    &plane,
-                    &mut plane_gradient,
-                );
+                energy += row(density, sy, weight, &self.weight_z, &plane, &mut plane_gradient);
                 if !energy.is_finite() {
                     return f64::INFINITY;
                 }
             }
             for k in 0..4 {
-                plane_adjoint(
-                    sx,
-                    k,
-                    &plane_gradient,
-                    blocks,
-                    &mut slab_gradients[(sx.first + k) % 4],
-                );
+                plane_adjoint(sx, k, &plane_gradient, blocks, &mut slab_gradients[(sx.first + k) % 4]);
             }
         }
         while finished < entered {
@@ -133,8 +103,7 @@ impl Assembly {
     pub fn determinants(&self, coefficients: &[f64]) -> (f64, usize, [f64; 3]) {
         let ny = self.axes[1].len();
         let blocks = self.weight_z.len();
-        let mut slabs: [Vec<Lanes>; 4] =
-            std::array::from_fn(|_| vec![Lanes::ZERO; ny * SLAB_KINDS * blocks]);
+        let mut slabs: [Vec<Lanes>; 4] = std::array::from_fn(|_| vec![Lanes::ZERO; ny * SLAB_KINDS * blocks]);
         let mut plane = vec![Lanes::ZERO; ny * PLANE_KINDS * blocks];
         let mut entered = 0;
         let (mut least, mut folded, mut at) = (f64::INFINITY, 0, [0.0; 3]);
@@ -144,12 +113,7 @@ impl Assembly {
                 entered += 1;
             }
             let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(
-                sx,
-                [window(0), window(1), window(2), window(3)],
-                blocks,
-                &mut plane,
-            );
+            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
             for sy in &self.y {
                 for b in 0..blocks {
                     let jacobian = jacobian_lanes(sy, &plane, blocks, b);
@@ -230,28 +194,14 @@ fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mu
     if s.value[k] == 0.0 && s.slope[k] == 0.0 {
         return;
     }
-    let rows = plane
-        .chunks_exact(PLANE_KINDS * blocks)
-        .zip(slab.chunks_exact_mut(SLAB_KINDS * blocks));
+    let rows = plane.chunks_exact(PLANE_KINDS * blocks).zip(slab.chunks_exact_mut(SLAB_KINDS * blocks));
     for (source, out) in rows {
         let (values, slopes) = out.split_at_mut(3 * blocks);
         for c in 0..3 {
             let source = &source[3 * c * blocks..][..3 * blocks];
-            accumulate(
-                s.slope[k],
-                &source[..blocks],
-                &mut values[c * blocks..][..blocks],
-            );
-            accumulate(
-                s.value[k],
-                &source[blocks..2 * blocks],
-                &mut values[c * blocks..][..blocks],
-            );
-            accumulate(
-                s.value[k],
-                &source[2 * blocks..],
-                &mut slopes[c * blocks..][..blocks],
-            );
+            accumulate(s.slope[k], &source[..blocks], &mut values[c * blocks..][..blocks]);
+            accumulate(s.value[k], &source[blocks..2 * blocks], &mut values[c * blocks..][..blocks]);
+            accumulate(s.value[k], &source[2 * blocks..], &mut slopes[c * blocks..][..blocks]);
         }
     }
 }
@@ -295,10 +245,7 @@ fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [
     for (kind, out) in jacobian.iter_mut().enumerate() {
         let w = if kind % 3 == 1 { &s.slope } else { &s.value };
         let at = kind * blocks + block;
-        *out = w[0] * sources[0][at]
-            + w[1] * sources[1][at]
-            + w[2] * sources[2][at]
-            + w[3] * sources[3][at];
+        *out = w[0] * sources[0][at] + w[1] * sources[1][at] + w[2] * sources[2][at] + w[3] * sources[3][at];
     }
     jacobian
 }
@@ -325,20 +272,7 @@ mod tests {
 
     #[test]
     fn energy_gradient_matches_central_differences_for_both_rules() {
-        let axes = [
-            Axis {
-                cells: 5,
-                cell: 0.4,
-            },
-            Axis {
-                cells: 4,
-                cell: 0.5,
-            },
-            Axis {
-                cells: 4,
-                cell: 0.6,
-            },
-        ];
+        let axes = [Axis { cells: 5, cell: 0.4 }, Axis { cells: 4, cell: 0.5 }, Axis { cells: 4, cell: 0.6 }];
         let [nx, ny, nz] = axes.map(|a| a.len());
         // Face coefficients of the identity, disturbed.
         let mut u = vec![0.0; 3 * nx * ny * nz];
@@ -367,11 +301,7 @@ mod tests {
                     assembly.energy(Mips, &moved, &mut unused)
                 };
                 let slope = (at_step(1e-5) - at_step(-1e-5)) / 2e-5;
-                assert!(
-                    (slope - gradient[at]).abs() < 1e-7,
-                    "{at}: {slope} {}",
-                    gradient[at]
-                );
+                assert!((slope - gradient[at]).abs() < 1e-7, "{at}: {slope} {}", gradient[at]);
             }
         }
     }

@@ -71,9 +71,9 @@ impl Axis {
                     self.sample(0.5 * i as f64, weight * self.cell)
                 })
                 .collect(),
-            Rule::Thirds => (0..=3 * self.cells)
-                .map(|i| self.sample(i as f64 / 3.0, self.cell / 3.0))
-                .collect(),
+            Rule::Thirds => {
+                (0..=3 * self.cells).map(|i| self.sample(i as f64 / 3.0, self.cell / 3.0)).collect()
+            }
             Rule::Gauss => {
                 let root = 1.2_f64.sqrt();
                 let outer = ((3.0 + 2.0 * root) / 7.0).sqrt();

@@ -11,19 +11,12 @@ pub(super) struct Bottom {
 
 impl Bottom {
     pub fn new(x: &Axis, y: &Axis) -> Bottom {
-        Bottom {
-            axes: [*x, *y],
-            x: Projection::new(x),
-            y: Projection::new(y),
-        }
+        Bottom { axes: [*x, *y], x: Projection::new(x), y: Projection::new(y) }
     }
 
     /// The Gauss points, in cells from the corner, y fastest.
     pub fn positions(&self) -> impl Iterator<Item = [f64; 2]> {
-        self.x
-            .samples
-            .iter()
-            .flat_map(|sx| self.y.samples.iter().map(|sy| [sx.at, sy.at]))
+        self.x.samples.iter().flat_map(|sx| self.y.samples.iter().map(|sy| [sx.at, sy.at]))
     }
 
     /// From face coefficients to control points of a two-dimensional spline, in place.
@@ -44,10 +37,7 @@ impl Bottom {
         let ny = self.axes[1].len();
         let along_x = expand(&self.x.samples, coefficients, ny);
         // y is the fast axis: each row is expanded by itself.
-        along_x
-            .chunks_exact(ny)
-            .flat_map(|row| self.y.samples.iter().map(|s| dot(s, row)))
-            .collect()
+        along_x.chunks_exact(ny).flat_map(|row| self.y.samples.iter().map(|s| dot(s, row))).collect()
     }
 
     /// Bᵀ applied to values at the Gauss points: the adjoint of [`Bottom::values`].
@@ -72,10 +62,7 @@ impl Bottom {
     /// Values at the Gauss points times their quadrature weights.
     pub fn weighted(&self, values: &[f64]) -> Vec<f64> {
         let mut out = values.to_vec();
-        for (row, sx) in out
-            .chunks_exact_mut(self.y.samples.len())
-            .zip(&self.x.samples)
-        {
+        for (row, sx) in out.chunks_exact_mut(self.y.samples.len()).zip(&self.x.samples) {
             for (v, sy) in row.iter_mut().zip(&self.y.samples) {
                 *v *= sx.weight * sy.weight;
             }
@@ -88,10 +75,7 @@ impl Bottom {
         let [nx, ny] = self.axes.map(|a| a.len());
         let mut out = vec![0.0; nx * ny];
         let mut row = vec![0.0; ny];
-        for (line, sx) in values
-            .chunks_exact(self.y.samples.len())
-            .zip(&self.x.samples)
-        {
+        for (line, sx) in values.chunks_exact(self.y.samples.len()).zip(&self.x.samples) {
             row.fill(0.0);
             for (v, sy) in line.iter().zip(&self.y.samples) {
                 for k in 0..4 {
@@ -119,9 +103,7 @@ impl Bottom {
 }
 
 fn dot(sample: &Sample, line: &[f64]) -> f64 {
-    (0..4)
-        .map(|k| sample.value[k] * line[sample.first + k])
-        .sum()
+    (0..4).map(|k| sample.value[k] * line[sample.first + k]).sum()
 }
 
 /// Rows of `width` at the samples from rows of `width` at the coefficients.
@@ -154,16 +136,7 @@ mod tests {
     use super::*;
 
     fn bottom() -> (Bottom, usize, usize) {
-        let (x, y) = (
-            Axis {
-                cells: 9,
-                cell: 0.3,
-            },
-            Axis {
-                cells: 6,
-                cell: 0.5,
-            },
-        );
+        let (x, y) = (Axis { cells: 9, cell: 0.3 }, Axis { cells: 6, cell: 0.5 });
         (Bottom::new(&x, &y), x.len(), y.len())
     }
 
@@ -186,20 +159,13 @@ mod tests {
         let (bottom, nx, ny) = bottom();
         let (u, f) = (wave(nx * ny, 0.4), wave(bottom.positions().count(), 1.1));
         let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        assert!(
-            (inner(&bottom.values(&u), &f) - inner(&u, &bottom.values_adjoint(&f))).abs() < 1e-10
-        );
-        assert!(
-            (inner(&bottom.project(&f), &u) - inner(&f, &bottom.project_adjoint(&u))).abs() < 1e-10
-        );
+        assert!((inner(&bottom.values(&u), &f) - inner(&u, &bottom.values_adjoint(&f))).abs() < 1e-10);
+        assert!((inner(&bottom.project(&f), &u) - inner(&f, &bottom.project_adjoint(&u))).abs() < 1e-10);
     }
 
     #[test]
     fn end_coefficients_are_face_values() {
-        let axis = Axis {
-            cells: 5,
-            cell: 0.2,
-        };
+        let axis = Axis { cells: 5, cell: 0.2 };
         let mut line = wave(8, 0.0);
         axis.control_to_face(&mut line);
         for (at, index) in [(0.0, 0), (5.0, 7)] {
@@ -209,12 +175,7 @@ mod tests {
         let middle = dot(&axis.sample(2.3, 0.0), &line);
         let mut control = line;
         axis.face_to_control(&mut control);
-        assert!(
-            control
-                .iter()
-                .zip(wave(8, 0.0))
-                .all(|(a, b)| (a - b).abs() < 1e-14)
-        );
+        assert!(control.iter().zip(wave(8, 0.0)).all(|(a, b)| (a - b).abs() < 1e-14));
         let w = axis_weights::<1>(2.3, 5);
         let expected: f64 = (0..4).map(|k| w.weight[0][k] * control[w.first + k]).sum();
         assert!((middle - expected).abs() < 1e-14);

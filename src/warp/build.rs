@@ -76,12 +76,7 @@ fn mips(
     progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
     start: Instant,
 ) -> Result<(WarpMap, MapReport)> {
-    let mut run = Run {
-        field,
-        progress,
-        outcome: Outcome::default(),
-        notes: Vec::new(),
-    };
+    let mut run = Run { field, progress, outcome: Outcome::default(), notes: Vec::new() };
     let map = run.coarse_to_fine(spec, Rule::Lobatto)?;
     let mut report = MapReport::measure(&map, field, spec.method);
     let mut best = (map, run.outcome);
@@ -133,17 +128,9 @@ impl Run<'_> {
             cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
             halvings.push(halve);
         }
-        let mut map = WarpMap::shear(
-            self.field,
-            &MapSpec {
-                cells,
-                ..spec.clone()
-            },
-        )?;
+        let mut map = WarpMap::shear(self.field, &MapSpec { cells, ..spec.clone() })?;
         for halve in halvings.into_iter().rev() {
-            map = self
-                .minimized(&map, rule, MAX_COARSE_ITERATIONS)?
-                .refined(halve);
+            map = self.minimized(&map, rule, MAX_COARSE_ITERATIONS)?.refined(halve);
         }
         self.minimized(&map, rule, MAX_ITERATIONS)
     }
@@ -151,14 +138,8 @@ impl Run<'_> {
     /// The minimizer on the grid of `start`, the map of a coarser grid.
     fn minimized(&mut self, start: &WarpMap, rule: Rule, iterations: usize) -> Result<WarpMap> {
         let cells = start.cells();
-        let shear = WarpMap::shear(
-            self.field,
-            &MapSpec {
-                cells,
-                thickness: start.size()[2],
-                ..MapSpec::default()
-            },
-        )?;
+        let shear =
+            WarpMap::shear(self.field, &MapSpec { cells, thickness: start.size()[2], ..MapSpec::default() })?;
         // What is fine on the coarser grid may fold when it is moved onto the ground that only this one sees: then that
         // ground is grown in steps. The shear is never folded.
         for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
@@ -172,11 +153,7 @@ impl Run<'_> {
                 if iterations < MAX_ITERATIONS {
                     problem.forgive_misfit(&u);
                 }
-                let iterations = if step < steps {
-                    GROWTH_ITERATIONS
-                } else {
-                    iterations
-                };
+                let iterations = if step < steps { GROWTH_ITERATIONS } else { iterations };
                 outcome = self.run(&mut problem, &mut u, cells, iterations)?;
                 if !outcome.value.is_finite() {
                     break;
@@ -189,9 +166,7 @@ impl Run<'_> {
                 return Ok(problem.to_map(&u, map));
             }
         }
-        Err(Error::Internal(
-            "the shear onto the terrain is folded".into(),
-        ))
+        Err(Error::Internal("the shear onto the terrain is folded".into()))
     }
 
     /// One run of the optimizer; it is added to what has been spent.
@@ -202,11 +177,7 @@ impl Run<'_> {
         cells: [usize; 3],
         iterations: usize,
     ) -> Result<Outcome> {
-        let limits = Limits {
-            iterations,
-            tolerance: TOLERANCE,
-            floor: ENERGY_FLOOR,
-        };
+        let limits = Limits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR };
         let outcome = minimize(problem, u, limits, &mut |iteration, energy, decrement| {
             (self.progress)(MapProgress {
                 cells,
@@ -217,9 +188,7 @@ impl Run<'_> {
             })
         });
         if outcome.interrupted {
-            return Err(Error::input(
-                "building the warp map was stopped before it was done",
-            ));
+            return Err(Error::input("building the warp map was stopped before it was done"));
         }
         self.outcome.iterations += outcome.iterations;
         self.outcome.evaluations += outcome.evaluations;

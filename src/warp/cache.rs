@@ -27,11 +27,7 @@ struct Header {
 
 /// `$WARPGAIT_CACHE`, else `$XDG_CACHE_HOME/warpgait`, else `~/.cache/warpgait`; none where neither is set.
 pub fn default_cache_dir() -> Option<PathBuf> {
-    let from = |name: &str| {
-        std::env::var_os(name)
-            .filter(|v| !v.is_empty())
-            .map(PathBuf::from)
-    };
+    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     from("WARPGAIT_CACHE")
         .or_else(|| from("XDG_CACHE_HOME").map(|d| d.join("warpgait")))
         .or_else(|| from("HOME").map(|d| d.join(".cache").join("warpgait")))
@@ -60,9 +56,7 @@ pub fn build_cached(
     }
     let (map, mut report) = build(field, spec, progress)?;
     if let Err(error) = write(&path, &map, &report) {
-        report
-            .warnings
-            .push(format!("the map could not be kept for next time ({error})"));
+        report.warnings.push(format!("the map could not be kept for next time ({error})"));
     }
     Ok((map, report, false))
 }
@@ -76,12 +70,7 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
     for n in [grid.columns, grid.rows] {
         hash.update((n as u64).to_le_bytes());
     }
-    for v in grid
-        .origin
-        .iter()
-        .chain(&grid.spacing)
-        .chain(field.samples())
-    {
+    for v in grid.origin.iter().chain(&grid.spacing).chain(field.samples()) {
         hash.update(v.to_le_bytes());
     }
     hex(&hash.finalize())
@@ -105,11 +94,7 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     if payload.len() != size_of_val(points) {
         return None;
     }
-    let values = payload
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|b| f64::from_le_bytes(*b));
+    let values = payload.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
     for (target, value) in points.as_flattened_mut().iter_mut().zip(values) {
         *target = value;
     }
@@ -118,18 +103,9 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
 
 /// Written aside and then renamed, so that no reader ever sees half a file.
 fn write(path: &Path, map: &WarpMap, report: &MapReport) -> Result<()> {
-    let payload: Vec<u8> = map
-        .control_points()
-        .as_flattened()
-        .iter()
-        .flat_map(|v| v.to_le_bytes())
-        .collect();
-    let header = Header {
-        checksum: hex(&Sha256::digest(&payload)),
-        report: report.clone(),
-    };
-    let header =
-        serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    let payload: Vec<u8> = map.control_points().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+    let header = Header { checksum: hex(&Sha256::digest(&payload)), report: report.clone() };
+    let header = serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory).map_err(|e| Error::io(directory, e))?;
     // Two processes may build the same map at once: each writes its own file.

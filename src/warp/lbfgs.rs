@@ -57,11 +57,7 @@ pub(super) fn minimize(
     let mut pairs: VecDeque<Pair> = VecDeque::new();
     let mut gradient = vec![0.0; x.len()];
     let mut value = objective.evaluate(x, &mut gradient);
-    let mut outcome = Outcome {
-        evaluations: 1,
-        value,
-        ..Outcome::default()
-    };
+    let mut outcome = Outcome { evaluations: 1, value, ..Outcome::default() };
     if !value.is_finite() {
         return outcome;
     }
@@ -112,12 +108,7 @@ pub(super) fn minimize(
             pairs.clear();
             continue;
         };
-        let mut pair = if pairs.len() == MEMORY {
-            pairs.pop_front()
-        } else {
-            None
-        }
-        .unwrap_or_else(|| Pair {
+        let mut pair = if pairs.len() == MEMORY { pairs.pop_front() } else { None }.unwrap_or_else(|| Pair {
             step: vec![0.0; x.len()],
             change: vec![0.0; x.len()],
             conditioned: vec![0.0; x.len()],
@@ -131,19 +122,12 @@ pub(super) fn minimize(
         }
         let mut trial_conditioned = trial_gradient.clone();
         objective.precondition(&mut trial_conditioned);
-        for ((y, new), old) in pair
-            .conditioned
-            .iter_mut()
-            .zip(&trial_conditioned)
-            .zip(&conditioned)
-        {
+        for ((y, new), old) in pair.conditioned.iter_mut().zip(&trial_conditioned).zip(&conditioned) {
             *y = new - old;
         }
         conditioned = trial_conditioned;
         let curvature = dot(&pair.step, &pair.change);
-        if curvature
-            > 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt()
-        {
+        if curvature > 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt() {
             pair.rho = 1.0 / curvature;
             pairs.push_back(pair);
         }
@@ -228,23 +212,10 @@ mod tests {
 
     #[test]
     fn it_finds_the_bottom_of_the_valley() {
-        let mut x: Vec<f64> = (0..20)
-            .map(|i| {
-                if i % 2 == 0 {
-                    -1.2
-                } else {
-                    1.0 + 0.1 * f64::from(i)
-                }
-            })
-            .collect();
-        let limits = Limits {
-            iterations: 500,
-            tolerance: 1e-9,
-            floor: 0.0,
-        };
-        let outcome = minimize(&mut Valley, &mut x, limits, &mut |_, _, _| {
-            ControlFlow::Continue(())
-        });
+        let mut x: Vec<f64> =
+            (0..20).map(|i| if i % 2 == 0 { -1.2 } else { 1.0 + 0.1 * f64::from(i) }).collect();
+        let limits = Limits { iterations: 500, tolerance: 1e-9, floor: 0.0 };
+        let outcome = minimize(&mut Valley, &mut x, limits, &mut |_, _, _| ControlFlow::Continue(()));
         assert!(outcome.converged, "{outcome:?}");
         assert!(x.iter().all(|v| (v - 1.0).abs() < 1e-4), "{x:?}");
     }
@@ -252,17 +223,9 @@ mod tests {
     #[test]
     fn it_stops_when_told_to() {
         let mut x = vec![-1.2, 1.0];
-        let limits = Limits {
-            iterations: 500,
-            tolerance: 1e-9,
-            floor: 0.0,
-        };
+        let limits = Limits { iterations: 500, tolerance: 1e-9, floor: 0.0 };
         let stop = &mut |iteration, _, _| {
-            if iteration < 3 {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
+            if iteration < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let outcome = minimize(&mut Valley, &mut x, limits, stop);
         assert!(outcome.interrupted && outcome.iterations == 3);

@@ -31,10 +31,7 @@ impl Preconditioner {
     ///
     /// # Errors
     /// Internal, when a mass matrix is not positive definite (weights that are not).
-    pub fn new(
-        samples: [&[Sample]; 3],
-        free: [[std::ops::Range<usize>; 3]; 3],
-    ) -> Result<Preconditioner> {
+    pub fn new(samples: [&[Sample]; 3], free: [[std::ops::Range<usize>; 3]; 3]) -> Result<Preconditioner> {
         let pencils = samples.map(pencil);
         let mut components = Vec::with_capacity(3);
         for (c, free) in free.iter().enumerate() {
@@ -44,41 +41,26 @@ impl Preconditioner {
                 let (v, lambda) = eigen(&pencils[d], &free[d])?;
                 let stiffness = if c == d { 2.0 / 3.0 } else { 0.5 };
                 vectors.push(v);
-                values.push(
-                    lambda
-                        .iter()
-                        .map(|l| stiffness * l.max(0.0))
-                        .collect::<Vec<f64>>(),
-                );
+                values.push(lambda.iter().map(|l| stiffness * l.max(0.0)).collect::<Vec<f64>>());
             }
             let mut inverse = Vec::with_capacity(values.iter().map(Vec::len).product());
             let greatest = values.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
             for a in &values[0] {
                 for b in &values[1] {
                     // A component that nothing pins would have a null space: the floor leaves it movable.
-                    inverse.extend(
-                        values[2]
-                            .iter()
-                            .map(|c| 1.0 / (a + b + c).max(1e-9 * greatest)),
-                    );
+                    inverse.extend(values[2].iter().map(|c| 1.0 / (a + b + c).max(1e-9 * greatest)));
                 }
             }
-            let vectors: [DMatrix<f64>; 3] = vectors
-                .try_into()
-                .map_err(|_| Error::Internal("three axes".into()))?;
+            let vectors: [DMatrix<f64>; 3] =
+                vectors.try_into().map_err(|_| Error::Internal("three axes".into()))?;
             components.push(Component {
                 transposed: std::array::from_fn(|d| vectors[d].transpose()),
                 vectors,
                 inverse,
             });
         }
-        let components = components
-            .try_into()
-            .map_err(|_| Error::Internal("three components".into()))?;
-        Ok(Preconditioner {
-            components,
-            scratch: [Vec::new(), Vec::new()],
-        })
+        let components = components.try_into().map_err(|_| Error::Internal("three components".into()))?;
+        Ok(Preconditioner { components, scratch: [Vec::new(), Vec::new()] })
     }
 
     /// `v` ← K⁻¹ `v`, for vectors (component, x, y, z) in C order.
@@ -117,10 +99,7 @@ fn tensor_product<'a>(
     );
     scratch.resize(m2 * m1 * n0, 0.0);
     let across = matrices[1].transpose();
-    for (source, target) in out
-        .chunks_exact(m2 * n1)
-        .zip(scratch.chunks_exact_mut(m2 * m1))
-    {
+    for (source, target) in out.chunks_exact(m2 * n1).zip(scratch.chunks_exact_mut(m2 * m1)) {
         DMatrixViewMut::from_slice(target, m2, m1).gemm(
             1.0,
             &DMatrixView::from_slice(source, m2, n1),
@@ -160,27 +139,15 @@ fn eigen(
     [stiffness, mass]: &[DMatrix<f64>; 2],
     free: &std::ops::Range<usize>,
 ) -> Result<(DMatrix<f64>, Vec<f64>)> {
-    let block = |m: &DMatrix<f64>| {
-        m.view((free.start, free.start), (free.len(), free.len()))
-            .into_owned()
-    };
-    let singular =
-        || Error::Internal("the mass matrix of the warp map is not positive definite".into());
+    let block = |m: &DMatrix<f64>| m.view((free.start, free.start), (free.len(), free.len())).into_owned();
+    let singular = || Error::Internal("the mass matrix of the warp map is not positive definite".into());
     let lower = block(mass).cholesky().ok_or_else(singular)?.unpack();
-    let half = lower
-        .solve_lower_triangular(&block(stiffness))
-        .ok_or_else(singular)?;
-    let whole = lower
-        .solve_lower_triangular(&half.transpose())
-        .ok_or_else(singular)?;
+    let half = lower.solve_lower_triangular(&block(stiffness)).ok_or_else(singular)?;
+    let whole = lower.solve_lower_triangular(&half.transpose()).ok_or_else(singular)?;
     let eigen = SymmetricEigen::new(0.5 * (&whole + whole.transpose()));
-    let vectors = lower
-        .tr_solve_lower_triangular(&eigen.eigenvectors)
-        .ok_or_else(singular)?;
+    let vectors = lower.tr_solve_lower_triangular(&eigen.eigenvectors).ok_or_else(singular)?;
     let mut padded = DMatrix::zeros(mass.nrows(), free.len());
-    padded
-        .view_mut((free.start, 0), (free.len(), free.len()))
-        .copy_from(&vectors);
+    padded.view_mut((free.start, 0), (free.len(), free.len())).copy_from(&vectors);
     Ok((padded, eigen.eigenvalues.iter().copied().collect()))
 }
 
@@ -191,27 +158,10 @@ mod tests {
 
     #[test]
     fn it_inverts_the_stiffness_matrix_written_out() {
-        let axes = [
-            Axis {
-                cells: 4,
-                cell: 0.5,
-            },
-            Axis {
-                cells: 5,
-                cell: 0.4,
-            },
-            Axis {
-                cells: 4,
-                cell: 0.3,
-            },
-        ];
+        let axes = [Axis { cells: 4, cell: 0.5 }, Axis { cells: 5, cell: 0.4 }, Axis { cells: 4, cell: 0.3 }];
         let samples = axes.map(|a| a.quadrature(Rule::Lobatto));
         let [n0, n1, n2] = axes.map(|a| a.len());
-        let free = [
-            [1..n0 - 1, 0..n1, 0..n2],
-            [0..n0, 1..n1 - 1, 0..n2],
-            [0..n0, 0..n1, 1..n2],
-        ];
+        let free = [[1..n0 - 1, 0..n1, 0..n2], [0..n0, 1..n1 - 1, 0..n2], [0..n0, 0..n1, 1..n2]];
         let mut preconditioner =
             Preconditioner::new([&samples[0], &samples[1], &samples[2]], free.clone()).unwrap();
         let [p0, p1, p2] = [0, 1, 2].map(|d| pencil(&samples[d]));

@@ -47,18 +47,11 @@ impl<'a, D: Density> Problem<'a, D> {
     /// # Errors
     /// Internal ones of the preconditioner.
     pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, rule: Rule) -> Result<Self> {
-        let axes: [Axis; 3] = std::array::from_fn(|d| Axis {
-            cells: map.cells()[d],
-            cell: map.cell()[d],
-        });
+        let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: map.cells()[d], cell: map.cell()[d] });
         let assembly = Assembly::new(axes, rule, weight, FACE_WEIGHT);
         let bottom = Bottom::new(&axes[0], &axes[1]);
         let [nx, ny, nz] = axes.map(|a| a.len());
-        let free = [
-            [1..nx - 1, 0..ny, 0..nz],
-            [0..nx, 1..ny - 1, 0..nz],
-            [0..nx, 0..ny, 1..nz],
-        ];
+        let free = [[1..nx - 1, 0..ny, 0..nz], [0..nx, 1..ny - 1, 0..nz], [0..nx, 0..ny, 1..nz]];
         let samples = std::array::from_fn(|d| assembly.samples(d));
         let preconditioner = Preconditioner::new(samples, free)?;
         Ok(Problem {
@@ -106,9 +99,7 @@ impl<'a, D: Density> Problem<'a, D> {
     pub fn forgive_misfit(&mut self, u: &[f64]) {
         let misfit = self.ground(u).misfit;
         let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
-        let energy = self
-            .assembly
-            .energy(self.density, u, &mut vec![0.0; u.len()]);
+        let energy = self.assembly.energy(self.density, u, &mut vec![0.0; u.len()]);
         if misfit_energy > energy {
             self.misfit_weight = 0.0;
         }
@@ -119,9 +110,7 @@ impl<'a, D: Density> Problem<'a, D> {
         let mut out = map.clone();
         let mut u = u.to_vec();
         for axis in 0..3 {
-            along(&mut u, self.axes.map(|a| a.len()), axis, |line| {
-                self.axes[axis].face_to_control(line)
-            });
+            along(&mut u, self.axes.map(|a| a.len()), axis, |line| self.axes[axis].face_to_control(line));
         }
         let n = u.len() / 3;
         for (i, point) in out.control_points_mut().iter_mut().enumerate() {
@@ -133,21 +122,13 @@ impl<'a, D: Density> Problem<'a, D> {
     /// The bottom-face coefficients of one component.
     fn face(&self, u: &[f64], component: usize) -> Vec<f64> {
         let n = u.len() / 3;
-        u[component * n..][..n]
-            .iter()
-            .step_by(self.axes[2].len())
-            .copied()
-            .collect()
+        u[component * n..][..n].iter().step_by(self.axes[2].len()).copied().collect()
     }
 
     /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
     fn ground(&self, u: &[f64]) -> Ground {
         let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let heights: Vec<f64> = x
-            .iter()
-            .zip(&y)
-            .map(|(x, y)| self.field.height(*x, *y))
-            .collect();
+        let heights: Vec<f64> = x.iter().zip(&y).map(|(x, y)| self.field.height(*x, *y)).collect();
         let mut face = self.bottom.project(&heights);
         let mut misfit = self.bottom.values(&face);
         for (m, h) in misfit.iter_mut().zip(&heights) {
@@ -202,10 +183,7 @@ impl<D: Density> Objective for Problem<'_, D> {
             }
         }
         // What is fixed.
-        gradient[2 * n..]
-            .iter_mut()
-            .step_by(nz)
-            .for_each(|g| *g = 0.0);
+        gradient[2 * n..].iter_mut().step_by(nz).for_each(|g| *g = 0.0);
         gradient[..ny * nz].fill(0.0);
         gradient[(nx - 1) * ny * nz..n].fill(0.0);
         for slab in gradient[n..2 * n].chunks_exact_mut(ny * nz) {
@@ -227,9 +205,7 @@ pub(super) fn coefficients_of(map: &WarpMap, axes: &[Axis; 3]) -> Vec<f64> {
         u.extend(map.control_points().iter().map(|p| p[c]));
     }
     for axis in 0..3 {
-        along(&mut u, axes.map(|a| a.len()), axis, |line| {
-            axes[axis].control_to_face(line)
-        });
+        along(&mut u, axes.map(|a| a.len()), axis, |line| axes[axis].control_to_face(line));
     }
     u
 }

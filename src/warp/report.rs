@@ -80,12 +80,7 @@ impl Distribution {
             samples.iter().find(reached).unwrap_or(last)[0]
         };
         let mean = samples.iter().map(|s| s[0] * s[1]).sum::<f64>() / total.max(f64::MIN_POSITIVE);
-        Distribution {
-            mean,
-            median: quantile(0.5),
-            p95: quantile(0.95),
-            max: last[0],
-        }
+        Distribution { mean, median: quantile(0.5), p95: quantile(0.95), max: last[0] }
     }
 }
 
@@ -100,13 +95,9 @@ impl MapReport {
     /// Measures a map against its terrain. How it was made is for the caller to fill in.
     pub(super) fn measure(map: &WarpMap, field: &Heightfield, method: MapMethod) -> MapReport {
         let (cells, cell, origin) = (map.cells(), map.cell(), map.origin());
-        let axes: [Axis; 3] = std::array::from_fn(|d| Axis {
-            cells: cells[d],
-            cell: cell[d],
-        });
+        let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: cells[d], cell: cell[d] });
         let fine = Assembly::new(axes, Rule::Thirds, |_| 1.0, 1.0);
-        let (min_determinant, inverted_points, at) =
-            fine.determinants(&coefficients_of(map, &axes));
+        let (min_determinant, inverted_points, at) = fine.determinants(&coefficients_of(map, &axes));
         let mut report = MapReport {
             method,
             cells,
@@ -165,11 +156,7 @@ impl MapReport {
         for i in 0..=nx {
             for j in 0..=ny {
                 for k in 0..=nz {
-                    let at = [
-                        i as f64 / nx as f64,
-                        j as f64 / ny as f64,
-                        k as f64 / nz as f64,
-                    ];
+                    let at = [i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64];
                     let local = Local::at(map, at);
                     let [x, y, z] = local.position;
                     let clearance = z - field.height(x, y);
@@ -229,10 +216,7 @@ impl Local {
     /// At a point given in shares of the box.
     fn at(map: &WarpMap, share: [f64; 3]) -> Local {
         let (origin, size) = (map.origin(), map.size());
-        let jet = map.jet(
-            std::array::from_fn(|d| origin[d] + share[d] * size[d]),
-            Order::First,
-        );
+        let jet = map.jet(std::array::from_fn(|d| origin[d] + share[d] * size[d]), Order::First);
         let j = nalgebra::Matrix3::from_fn(|r, c| jet.jacobian[r][c]);
         let determinant = j.determinant();
         let squares = (j.transpose() * j).symmetric_eigenvalues();

@@ -16,16 +16,7 @@ impl WarpMap {
         let extent = field.extent();
         let mut map = WarpMap::flat(extent, spec)?;
         let ([nx, ny, nz], [width, length, _]) = (map.cells(), map.cell());
-        let (x, y) = (
-            Axis {
-                cells: nx,
-                cell: width,
-            },
-            Axis {
-                cells: ny,
-                cell: length,
-            },
-        );
+        let (x, y) = (Axis { cells: nx, cell: width }, Axis { cells: ny, cell: length });
         let bottom = Bottom::new(&x, &y);
         let heights: Vec<f64> = bottom
             .positions()

@@ -47,12 +47,7 @@ impl WarpMap {
                 }
             }
         }
-        Ok(WarpMap {
-            cells,
-            origin,
-            cell,
-            control_points,
-        })
+        Ok(WarpMap { cells, origin, cell, control_points })
     }
 
     /// A map from its parts; (Nx+3)(Ny+3)(Nz+3) control points.
@@ -62,16 +57,8 @@ impl WarpMap {
         cell: [f64; 3],
         control_points: Vec<[f64; 3]>,
     ) -> WarpMap {
-        debug_assert_eq!(
-            control_points.len(),
-            cells.iter().map(|n| n + 3).product::<usize>()
-        );
-        WarpMap {
-            cells,
-            origin,
-            cell,
-            control_points,
-        }
+        debug_assert_eq!(control_points.len(), cells.iter().map(|n| n + 3).product::<usize>());
+        WarpMap { cells, origin, cell, control_points }
     }
 
     /// Cells along x, y, z.
@@ -121,8 +108,8 @@ impl WarpMap {
     /// All derivatives below the M-th, axis by axis (sum factorization): 16 runs of 4 points are contracted along x, the
     /// result along y, and that along z.
     fn derivatives<const M: usize>(&self, x: [f64; 3]) -> WarpJet {
-        let [wx, wy, wz] = [0, 1, 2]
-            .map(|d| axis_weights::<M>((x[d] - self.origin[d]) / self.cell[d], self.cells[d]));
+        let [wx, wy, wz] =
+            [0, 1, 2].map(|d| axis_weights::<M>((x[d] - self.origin[d]) / self.cell[d], self.cells[d]));
         let (ny, nz) = (self.cells[1] + 3, self.cells[2] + 3);
         let mut along_x = [[[0.0; 12]; 4]; M];
         for i in 0..4 {
@@ -159,10 +146,7 @@ impl WarpMap {
                     // Place among the derivatives of this order, as in `derivative_slot`.
                     let slot = (b + c) * (b + c + 1) / 2 + c;
                     for e in 0..3 {
-                        let value = w[0] * run[e]
-                            + w[1] * run[3 + e]
-                            + w[2] * run[6 + e]
-                            + w[3] * run[9 + e];
+                        let value = w[0] * run[e] + w[1] * run[3 + e] + w[2] * run[6 + e] + w[3] * run[9 + e];
                         match a + b + c {
                             0 => jet.position[e] = value,
                             1 => jet.jacobian[e][slot] = scale * value,
@@ -203,16 +187,9 @@ impl WarpMap {
             )));
         }
         let mix = |p: &[f64; 3], q: &[f64; 3]| std::array::from_fn(|c| (1.0 - a) * p[c] + a * q[c]);
-        let control_points = self
-            .control_points
-            .iter()
-            .zip(&other.control_points)
-            .map(|(p, q)| mix(p, q))
-            .collect();
-        Ok(WarpMap {
-            control_points,
-            ..self.clone()
-        })
+        let control_points =
+            self.control_points.iter().zip(&other.control_points).map(|(p, q)| mix(p, q)).collect();
+        Ok(WarpMap { control_points, ..self.clone() })
     }
 
     /// The map as stored in a plan: ψ with the N + 7 knots of each axis.
@@ -222,9 +199,7 @@ impl WarpMap {
             control_points: self.control_points.clone(),
             origin: self.origin,
             knots: std::array::from_fn(|d| {
-                (0..self.cells[d] + 7)
-                    .map(|i| self.origin[d] + (i as f64 - 3.0) * self.cell[d])
-                    .collect()
+                (0..self.cells[d] + 7).map(|i| self.origin[d] + (i as f64 - 3.0) * self.cell[d]).collect()
             }),
         }
     }
@@ -234,11 +209,7 @@ impl WarpMap {
     /// # Errors
     /// When shape, knots and control points do not fit together, the knots are not uniform, or a value is not finite.
     pub fn from_grid(grid: &MapGrid) -> Result<WarpMap> {
-        let wrong = |what: String| {
-            Err(Error::input(format!(
-                "warp map: {what}; write the plan again"
-            )))
-        };
+        let wrong = |what: String| Err(Error::input(format!("warp map: {what}; write the plan again")));
         let mut cell = [0.0; 3];
         for d in 0..3 {
             let knots = &grid.knots[d];
@@ -281,11 +252,7 @@ impl WarpMap {
                 grid.shape
             ));
         }
-        if let Some(i) = grid
-            .control_points
-            .iter()
-            .position(|p| p.iter().any(|v| !v.is_finite()))
-        {
+        if let Some(i) = grid.control_points.iter().position(|p| p.iter().any(|v| !v.is_finite())) {
             return wrong(format!("control point {i} is not finite"));
         }
         Ok(WarpMap {
@@ -311,10 +278,7 @@ fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3]
         )));
     }
     if let Some(n) = spec.cells.iter().find(|n| !(4..=512).contains(*n)) {
-        return Err(Error::input(format!(
-            "map.cells = {:?}: {n} is not between 4 and 512",
-            spec.cells
-        )));
+        return Err(Error::input(format!("map.cells = {:?}: {n} is not between 4 and 512", spec.cells)));
     }
     let cells: usize = spec.cells.iter().product();
     if cells > MAX_CELLS {
