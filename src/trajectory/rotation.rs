@@ -146,8 +146,11 @@ pub fn compose(p: &RotationJet<3>, e: &RotationJet<3>) -> RotationJet<6> {
 mod tests {
     use super::*;
 
+    /// J, ∂_d J and ∂_e ∂_d J.
+    type Field = (Matrix3<f64>, [Matrix3<f64>; 3], [[Matrix3<f64>; 3]; 3]);
+
     /// A curved field of Jacobians J(y) with known derivatives.
-    fn field(y: &Vector3<f64>) -> (Matrix3<f64>, [Matrix3<f64>; 3], [[Matrix3<f64>; 3]; 3]) {
+    fn field(y: &Vector3<f64>) -> Field {
         let entry = |i: usize, j: usize| {
             let k = Vector3::new(0.3 + 0.2 * i as f64, 0.5 - 0.3 * j as f64, 0.1 * (i + j) as f64);
             let phase = 1.0 + i as f64 - 0.7 * j as f64;
