@@ -1,7 +1,7 @@
 //! The motion as splines: which foot stands when, and how every sampled quantity depends linearly on the variables.
 //!
 //! Everything here is the same for both formulations. Whether a node is a point of F or of ambient space is decided in
-//! [`crate::nlp::nodes`].
+//! [`crate::nlp::state`].
 
 pub mod gait;
 pub mod layout;

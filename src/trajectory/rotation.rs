@@ -1,16 +1,16 @@
 //! Rotations: ZYX Euler angles, the projection 𝒫 onto SO(3) (Eq. 12), and their derivatives as rotation vectors.
 //!
-//! A rotation R(y) that depends on parameters y has derivatives ∂R/∂y_d = [w_d]× R with rotation vectors w_d in the
-//! frame that R maps into, and second derivatives ∂²R/∂y_d∂y_e = ([∂_e w_d]× + [w_d]× [w_e]×) R.
+//! A rotation R(y) that depends on parameters y has derivatives ∂R/∂y_d = \[w_d\]× R with rotation vectors w_d in the
+//! frame that R maps into, and second derivatives ∂²R/∂y_d∂y_e = (\[∂_e w_d\]× + \[w_d\]× \[w_e\]×) R.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// v ↦ [v]×, the matrix with [v]× u = v × u.
+/// v ↦ \[v\]×, the matrix with \[v\]× u = v × u.
 pub fn cross_matrix(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// A ↦ a with [a]× = A − Aᵀ.
+/// A ↦ a with \[a\]× = A − Aᵀ.
 pub fn skew_part(a: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(a[(2, 1)] - a[(1, 2)], a[(0, 2)] - a[(2, 0)], a[(1, 0)] - a[(0, 1)])
 }
@@ -92,7 +92,7 @@ pub fn project_to_rotation(j: &Matrix3<f64>) -> Matrix3<f64> {
 /// 𝒫(J(y)) for parameters y of which J depends through `first[d]` = ∂_d J and `second[e][d]` = ∂_e ∂_d J (corollary IV.1,
 /// with the sign of the projection mended).
 ///
-/// With J = P H: (tr H 1 − H) ω_d = skew_part(Pᵀ ∂_d J) and ∂_d P = P [ω_d]× = [P ω_d]× P.
+/// With J = P H: (tr H 1 − H) ω_d = skew_part(Pᵀ ∂_d J) and ∂_d P = P \[ω_d\]× = \[P ω_d\]× P.
 pub fn projection(
     j: &Matrix3<f64>,
     first: &[Matrix3<f64>; 3],
