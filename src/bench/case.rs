@@ -62,6 +62,17 @@ pub struct Measured {
     pub cpu: Cpu,
 }
 
+impl Measured {
+    /// A motion that is solved and passes every check; a map alone that converged and is nowhere folded.
+    pub fn is_good(&self) -> bool {
+        match (&self.motion, &self.map) {
+            (Some(motion), _) => motion.solved && motion.passed,
+            (None, Some(map)) => map.report.converged && map.report.inverted_points == 0,
+            (None, None) => false,
+        }
+    }
+}
+
 /// Processor time by stage, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cpu {

@@ -179,11 +179,7 @@ fn failed_checks(motion: &MotionMeasured) -> String {
 
 /// Whether a row is as good as it can be.
 pub fn is_good(row: &Row) -> bool {
-    row.outcome.as_ref().is_ok_and(|measured| match (&measured.motion, &measured.map) {
-        (Some(motion), _) => motion.solved && motion.passed,
-        (None, Some(map)) => map.report.converged && map.report.inverted_points == 0,
-        (None, None) => false,
-    })
+    row.outcome.as_ref().is_ok_and(Measured::is_good)
 }
 
 /// The groups as a table, and the cases that fail with their reasons.

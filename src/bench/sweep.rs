@@ -1,7 +1,7 @@
 //! Runs cases in processes of their own (Ipopt is not re-entrant), keeps what is finished, goes on where it stopped.
 //!
 //! In the folder of results: `cases/NAME.json` a finished case, `cases/NAME.toml` its scenario, `cases/NAME.log` what its
-//! process said, `plans/NAME.plan.npz` its plan, `maps/` the maps of this program. A finished case carries the SHA-256 of
+//! process said, `plans/NAME.plan.npz` its plan unless all is well with it, `maps/` the maps of this program. A finished case carries the SHA-256 of
 //! its scenario and of the program; when either is another, it is computed again. A case without a result is a row with
 //! its reason, and is tried again next time.
 
@@ -157,6 +157,10 @@ impl Place {
     /// Computes a case in a process of its own.
     fn compute(&self, case: &Case, limit: Duration) -> std::result::Result<Measured, String> {
         let measured = self.spawn(case, limit)?;
+        if measured.is_good() {
+            // Plans are megabytes; those that are looked into are those that fail. A map has none to remove.
+            let _ = std::fs::remove_file(self.plan(case));
+        }
         let kept = Kept { key: key(case), program: self.digest.clone(), measured };
         let json = serde_json::to_vec(&kept).map_err(|e| e.to_string())?;
         write_atomically(&self.file(case, "json"), &json).map_err(|e| e.to_string())?;
