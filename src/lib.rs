@@ -52,6 +52,7 @@
 //! | [`plan`] | the motion | samples at ten times the rate, exact splines and provenance in one `.npz` file |
 //! | [`check`] | a plan file alone | every law again, by other code, between the samples too |
 //! | [`report`] | plan, checks | tables and drawings |
+//! | [`bench`] | the paper's protocol | its tables and figures, and speed |
 //! | [`cli`] | arguments | exit codes |
 //!
 //! # Notation
@@ -73,6 +74,7 @@
 //! World frame: x forward, y left, z up, SI units. Inside the nonlinear program forces are in m g and torques in
 //! m g · 1 m, so that a tolerance means about the same for every row.
 
+pub mod bench;
 pub mod check;
 pub mod cli;
 pub mod constraints;

@@ -4,6 +4,7 @@
 //! object on standard output. Exit codes: 0 all is well; 1 a plan that is not solved or fails a check; 2 bad input or
 //! usage, nothing written; 130 interrupted.
 
+mod bench;
 mod check;
 mod console;
 mod init;
@@ -43,6 +44,7 @@ Examples:
   warpgait check hill.plan.npz                  recompute every law of a plan
   warpgait check hill.plan.npz --plot hill.svg  and draw the residuals over time
   warpgait validate hill.plan.npz               replay it in MuJoCo
+  warpgait bench table1 --quick                 a taste of the paper's Table I
 
 Exit codes: 0 solved and every check holds; 1 a plan that is not solved or fails a check;
 2 bad input or usage, nothing written; 130 interrupted.";
@@ -72,6 +74,10 @@ enum Command {
     Map(map::MapArguments),
     /// Recompute every law of a plan in ambient space, on the plan's own samples
     Check(check::CheckArguments),
+    /// Reproduce the paper's tables and figures, and measure beyond them
+    Bench(bench::BenchArguments),
+    #[command(hide = true)]
+    BenchCase(bench::CaseArguments),
     /// Replay a plan on the full robot in MuJoCo (needs the Python package)
     Validate {
         /// NAME.plan.npz and options; `-- --help` lists them
@@ -113,6 +119,8 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Solve(arguments) => solve::solve(&arguments, console),
         Command::Map(arguments) => map::map(&arguments, console),
         Command::Check(arguments) => check::check(&arguments, console),
+        Command::Bench(arguments) => bench::bench(arguments, console),
+        Command::BenchCase(arguments) => bench::case(&arguments),
         Command::Validate { arguments } => validate::validate(&arguments, console),
     }
 }

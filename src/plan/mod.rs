@@ -170,7 +170,7 @@ pub struct MetaSolver {
 }
 
 /// `meta.solver.seconds`.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Building the map.
     pub map: f64,

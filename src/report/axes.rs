@@ -3,7 +3,7 @@
 use super::svg::{Font, Svg};
 
 /// Where data goes on the page.
-pub(super) struct Axes {
+pub(crate) struct Axes {
     /// x, y, width, height of the frame, pixels.
     pub frame: [f64; 4],
     /// Data at the left and right.
@@ -110,7 +110,7 @@ fn ticks([a, b]: [f64; 2], count: usize) -> (Vec<f64>, usize) {
 }
 
 /// The range of some values with a margin on both sides, as a share of it.
-pub(super) fn range(values: impl IntoIterator<Item = f64>, margin: f64) -> [f64; 2] {
+pub(crate) fn range(values: impl IntoIterator<Item = f64>, margin: f64) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for value in values {
         range = [range[0].min(value), range[1].max(value)];

@@ -1,9 +1,9 @@
 //! What people read: tables for the terminal and drawings of a plan.
 
-mod axes;
+pub(crate) mod axes;
 mod residuals;
 mod sheet;
-mod svg;
+pub(crate) mod svg;
 pub mod table;
 
 pub use residuals::residuals;

@@ -6,12 +6,12 @@ use std::fmt::{Display, Write};
 const FEET: [&str; 6] = ["#c8352c", "#2166ac", "#e08214", "#1b8a5a", "#7b3fa0", "#6b6b6b"];
 
 /// The colour of a foot.
-pub(super) fn foot_colour(foot: usize) -> &'static str {
+pub(crate) fn foot_colour(foot: usize) -> &'static str {
     FEET[foot % FEET.len()]
 }
 
 /// A drawing in the making; lengths are pixels, y points down.
-pub(super) struct Svg {
+pub(crate) struct Svg {
     width: f64,
     height: f64,
     body: String,
@@ -20,7 +20,7 @@ pub(super) struct Svg {
 
 /// How a text is set.
 #[derive(Clone, Copy)]
-pub(super) struct Font {
+pub(crate) struct Font {
     pub size: f64,
     /// `start`, `middle` or `end`.
     pub anchor: &'static str,

@@ -1,0 +1,118 @@
+//! Figures with curves: Fig. 11, the frontier, speed.
+
+use super::super::case::MotionMeasured;
+use super::super::summary::Group;
+use super::super::sweep::Row;
+use super::{colour, distinct, legend, motion};
+use crate::report::axes::{Axes, range};
+use crate::report::svg::{Font, Svg};
+
+const DASHED: &str = "stroke-dasharray=\"6 4\"";
+
+fn style(method: &str, more: &str) -> String {
+    format!("stroke=\"{}\" stroke-width=\"2\" {more}", colour(method))
+}
+
+fn heading(svg: &mut Svg, title: &str) {
+    svg.text([70.0, 34.0], title, Font { size: 17.0, ..Font::TITLE });
+}
+
+/// Fig. 11: the largest violation by iteration of each row.
+pub(super) fn histories(rows: &[&Row]) -> String {
+    let mut svg = Svg::new(760.0, 460.0);
+    heading(&mut svg, "Largest violation by iteration, a climb to the top of the hill");
+    let all: Vec<f64> = rows.iter().filter_map(|row| motion(row)).flat_map(|m| m.history.clone()).collect();
+    let longest = rows.iter().filter_map(|row| Some(motion(row)?.history.len())).max().unwrap_or(2);
+    let frame = [80.0, 90.0, 650.0, 310.0];
+    let axes = Axes::logarithmic(frame, [0.0, longest.saturating_sub(1).max(1) as f64], &all);
+    axes.draw(&mut svg, "dashed: the tolerance", "iteration", "units of the NLP");
+    let floor = 10f64.powf(axes.y[0]);
+    svg.clipped(frame, |svg| {
+        let ends = axes.x.map(|x| axes.at(x, 1e-4));
+        svg.line(ends[0], ends[1], &format!("stroke=\"#555\" {DASHED}"));
+        for row in rows {
+            let history = motion(row).map_or(&[][..], |motion| &motion.history);
+            // A violation of zero has no logarithm; it is drawn at the bottom.
+            let points = history.iter().enumerate().map(|(i, v)| axes.at(i as f64, v.max(floor)));
+            svg.polyline(points, &style(&row.case.method, ""));
+        }
+    });
+    let styles: Vec<String> = rows.iter().map(|row| style(&row.case.method, "")).collect();
+    let names: Vec<(&str, &str)> =
+        rows.iter().map(|row| row.case.method.as_str()).zip(styles.iter().map(String::as_str)).collect();
+    legend(&mut svg, [80.0, 62.0], &names);
+    svg.finish()
+}
+
+/// Shares of solved and checked motions against what makes a terrain steeper.
+pub(super) fn frontier(groups: &[Group]) -> String {
+    let mut svg = Svg::new(1240.0, 860.0);
+    heading(&mut svg, "Motions found beyond the hard level");
+    let [warped, direct] = ["warped", "direct"].map(|method| style(method, ""));
+    let solved = format!("stroke=\"#555\" stroke-width=\"2\" {DASHED}");
+    let names =
+        [("warped", &*warped), ("direct", &*direct), ("dashed: solved, but for the checks", &*solved)];
+    legend(&mut svg, [70.0, 62.0], &names);
+    for (i, terrain) in distinct(groups.iter().map(|group| group.terrain.as_str())).into_iter().enumerate() {
+        let here: Vec<&Group> = groups.iter().filter(|group| group.terrain == terrain).collect();
+        let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
+        let name = here[0].parameter.map_or("", |(name, _)| name);
+        let frame = [90.0 + 600.0 * (i % 2) as f64, 110.0 + 380.0 * (i / 2) as f64, 500.0, 280.0];
+        let axes = Axes::new(frame, range(here.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
+        axes.draw(&mut svg, terrain, name, "motions found, %");
+        for method in distinct(here.iter().map(|group| group.method.as_str())) {
+            let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
+                let of_method = here.iter().filter(|group| group.method == method);
+                of_method
+                    .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
+                    .collect()
+            };
+            svg.polyline(curve(|group| group.solved), &style(method, DASHED));
+            let checked = curve(|group| group.passed);
+            svg.polyline(checked.iter().copied(), &style(method, ""));
+            checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+        }
+    }
+    svg.finish()
+}
+
+/// How the cost grows with the length of the motion.
+pub(super) fn speed(rows: &[&Row]) -> String {
+    let mut svg = Svg::new(1240.0, 480.0);
+    heading(&mut svg, "Cost against the length of the motion");
+    let (warped, direct) = (style("warped", ""), style("direct", ""));
+    legend(&mut svg, [70.0, 62.0], &[("warped", &warped), ("direct", &direct)]);
+    let by_iteration = |seconds: f64, m: &MotionMeasured| 1e3 * seconds / m.iterations.max(1) as f64;
+    let cpu = |row: &Row| row.outcome.as_ref().ok().map(|measured| measured.cpu.solve);
+    let linear = |row: &Row| motion(row).map(|m| by_iteration(m.seconds.linear_solver, m));
+    let evaluation = |row: &Row| motion(row).map(|m| by_iteration(m.seconds.evaluation, m));
+    let left = [90.0, 110.0, 500.0, 300.0];
+    panel(&mut svg, rows, left, ["guess and NLP", "processor time, s"], &[(&cpu, "")]);
+    let right = [690.0, 110.0, 500.0, 300.0];
+    let parts: [Curve; 2] = [(&linear, ""), (&evaluation, DASHED)];
+    let words = ["an iteration: linear solver (solid), evaluation (dashed)", "wall time, ms"];
+    panel(&mut svg, rows, right, words, &parts);
+    svg.finish()
+}
+
+/// A value of a row, and how its line is drawn.
+type Curve<'a> = (&'a dyn Fn(&Row) -> Option<f64>, &'a str);
+
+/// Values of the rows over the horizon, a line for each method and curve.
+fn panel(svg: &mut Svg, rows: &[&Row], frame: [f64; 4], [title, unit]: [&str; 2], curves: &[Curve]) {
+    let horizon = |row: &Row| row.case.parameter.map_or(0.0, |(_, value)| value);
+    let values = curves.iter().flat_map(|(value, _)| rows.iter().filter_map(|row| value(row)));
+    let [_, most] = range(values.chain([0.0]), 0.05);
+    let [_, longest] = range(rows.iter().map(|row| horizon(row)), 0.05);
+    let axes = Axes::new(frame, [0.0, longest], [0.0, most]);
+    axes.draw(svg, title, "horizon, s", unit);
+    for method in distinct(rows.iter().map(|row| row.case.method.as_str())) {
+        for (value, dash) in curves {
+            let of_method = rows.iter().filter(|row| row.case.method == method);
+            let points: Vec<[f64; 2]> =
+                of_method.filter_map(|row| Some(axes.at(horizon(row), value(row)?))).collect();
+            svg.polyline(points.iter().copied(), &style(method, dash));
+            points.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Fig. 4: the conformal error on the ground.
+
+use super::super::sweep::Row;
+use super::blend;
+use crate::report::axes::{Axes, range};
+use crate::report::number;
+use crate::report::svg::{Font, Svg};
+
+/// Bars of a histogram.
+const BINS: usize = 30;
+/// Height of a map's panels, with what is around them, pixels.
+const PANEL: f64 = 460.0;
+
+/// The error on the ground from above, and how it is distributed; one map below the other.
+pub(super) fn errors(rows: &[&Row]) -> String {
+    let mut svg = Svg::new(1000.0, 60.0 + PANEL * rows.len() as f64);
+    let title = "Conformal error 1 − σ_min/σ_max of the map on the ground";
+    svg.text([70.0, 34.0], title, Font { size: 17.0, ..Font::TITLE });
+    for (i, row) in rows.iter().enumerate() {
+        let top = 100.0 + PANEL * i as f64;
+        let map = row.outcome.as_ref().ok().and_then(|measured| measured.map.as_ref());
+        let name = format!("{} {}", row.case.terrain, row.case.level);
+        match map {
+            Some(map) if !map.ground_errors.is_empty() => {
+                let mean = 100.0 * map.report.conformal_ground.mean;
+                from_above(&mut svg, &name, &map.ground_errors, top);
+                histogram(&mut svg, mean, &map.ground_errors, top);
+            }
+            _ => svg.text([90.0, top], &format!("{name}: no map"), Font::LABEL.anchored("start")),
+        }
+    }
+    svg.finish()
+}
+
+fn most(errors: &[[f64; 3]]) -> f64 {
+    errors.iter().map(|[_, _, error]| *error).fold(1e-3, f64::max)
+}
+
+fn from_above(svg: &mut Svg, name: &str, errors: &[[f64; 3]], top: f64) {
+    let frame = [90.0, top, 340.0, 340.0];
+    let axes = Axes::equal(
+        frame,
+        range(errors.iter().map(|e| e[0]), 0.02),
+        range(errors.iter().map(|e| e[1]), 0.02),
+    );
+    let worst = most(errors);
+    let side = frame[2] / (errors.len() as f64).sqrt() + 1.5;
+    svg.clipped(frame, |svg| {
+        for [x, y, error] in errors {
+            let [px, py] = axes.at(*x, *y);
+            let style = format!("fill=\"{}\"", blend(1.0 - error / worst));
+            svg.rect([px - 0.5 * side, py - 0.5 * side, side, side], &style);
+        }
+    });
+    let title = format!("{name}: blue 0, red {} %", number(100.0 * worst));
+    axes.draw(svg, &title, "x, m", "y, m");
+}
+
+fn histogram(svg: &mut Svg, mean: f64, errors: &[[f64; 3]], top: f64) {
+    let worst = 100.0 * most(errors);
+    let counts = counts(errors.iter().map(|e| 100.0 * e[2]), worst);
+    let share = |count: usize| 100.0 * count as f64 / errors.len() as f64;
+    let highest = counts.iter().map(|&count| share(count)).fold(1.0, f64::max);
+    let axes = Axes::new([540.0, top, 420.0, 340.0], [0.0, worst], [0.0, 1.05 * highest]);
+    let title = format!("mean {} % (paper, on its ripple: 7.8 %)", number(mean));
+    axes.draw(svg, &title, "error, %", "points, %");
+    let width = worst / BINS as f64;
+    for (bin, &count) in counts.iter().enumerate() {
+        let [left, y] = axes.at(width * bin as f64, share(count));
+        let [right, bottom] = axes.at(width * (bin + 1) as f64, 0.0);
+        svg.rect(
+            [left, y, right - left, bottom - y],
+            "fill=\"#2166ac\" stroke=\"#fff\" stroke-width=\"0.6\"",
+        );
+    }
+    let ends = [0.0, 1.05 * highest].map(|y| axes.at(mean, y));
+    svg.line(ends[0], ends[1], "stroke=\"#c8352c\" stroke-width=\"1.6\"");
+}
+
+/// How many values fall into each of `BINS` equal parts of 0 … most.
+fn counts(values: impl Iterator<Item = f64>, most: f64) -> [usize; BINS] {
+    let mut counts = [0; BINS];
+    for value in values {
+        counts[((value / most * BINS as f64) as usize).min(BINS - 1)] += 1;
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_is_counted_once() {
+        let counts = counts([0.0, 0.5, 1.0, 1.0].into_iter(), 1.0);
+        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 1, 2));
+        assert_eq!(counts.iter().sum::<usize>(), 4);
+    }
+}

@@ -1,0 +1,461 @@
+//! Which cases a bench consists of: the paper's Section V, and what goes beyond it.
+
+use std::f64::consts::TAU;
+
+use super::Options;
+use super::case::Work;
+
+/// Half the size of the terrain, m: starts and goals lie on circles of half of it.
+const RADIUS: f64 = 3.0;
+/// Headings on ripple and cone: every 15°.
+const HEADINGS: usize = 24;
+/// Goals on hill and pit.
+const GOALS: usize = 15;
+/// Cases by terrain in a quick run, and at each step of the frontier.
+const FEW: usize = 3;
+/// Foot of the hill, where its climbs start, m.
+const HILL_START: [f64; 2] = [-2.2, 0.0];
+/// Places on the hill, m: fanned over its near slope, up to the top and a little beyond.
+const HILL_GOALS: [[f64; 2]; GOALS] = [
+    [-0.7, 0.0],
+    [-0.45, 0.3],
+    [-0.45, -0.3],
+    [-0.2, 0.2],
+    [-0.2, -0.2],
+    [0.0, 0.0],
+    [-0.6, 0.45],
+    [-0.6, -0.45],
+    [0.1, 0.25],
+    [0.1, -0.25],
+    [-0.3, 0.0],
+    [0.0, 0.4],
+    [0.0, -0.4],
+    [0.2, 0.0],
+    [-0.8, 0.2],
+];
+/// Distance of the goals outside the pit from its centre, m.
+const PIT_GOAL: f64 = 2.0;
+/// Horizons of `speed`, s.
+const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
+
+/// The four terrains of the paper.
+pub const TERRAINS: [&str; 4] = ["rippled", "conic", "hilly", "pit"];
+/// Their levels.
+pub const LEVELS: [&str; 3] = ["easy", "medium", "hard"];
+/// Both formulations.
+pub const FORMULATIONS: [&str; 2] = ["warped", "direct"];
+/// How a map can be found.
+pub const METHODS: [&str; 6] = ["mips", "acap-local-global", "acap-newton", "dirichlet", "arap", "shear"];
+
+/// A table or figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bench {
+    /// Table I: how many motions are found, on four terrains, by both formulations.
+    Table1,
+    /// Fig. 4: the conformal error of the map on the ground.
+    Fig4,
+    /// Fig. 8: violation by iteration, for all headings.
+    Fig8,
+    /// Fig. 9: time to solve, for all headings.
+    Fig9,
+    /// Fig. 11: violation by iteration, for one climb.
+    Fig11,
+    /// Success against steepness beyond the hard level.
+    Frontier,
+    /// Maps by method, terrain and level.
+    Map,
+    /// Cost against the length of the motion.
+    Speed,
+}
+
+impl Bench {
+    /// All of them.
+    pub const ALL: [Bench; 8] = [
+        Bench::Table1,
+        Bench::Fig4,
+        Bench::Fig8,
+        Bench::Fig9,
+        Bench::Fig11,
+        Bench::Frontier,
+        Bench::Map,
+        Bench::Speed,
+    ];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Bench::Table1 => "table1",
+            Bench::Fig4 => "fig4",
+            Bench::Fig8 => "fig8",
+            Bench::Fig9 => "fig9",
+            Bench::Fig11 => "fig11",
+            Bench::Frontier => "frontier",
+            Bench::Map => "map",
+            Bench::Speed => "speed",
+        }
+    }
+
+    /// The cases, in the order in which they are run.
+    pub fn cases(self, options: &Options) -> Vec<Case> {
+        let protocol = Protocol { options };
+        match self {
+            Bench::Table1 => protocol.table(&TERRAINS, protocol.levels(&LEVELS)),
+            Bench::Fig8 | Bench::Fig9 => protocol.table(&["rippled", "conic"], protocol.levels(&["medium"])),
+            Bench::Fig11 => protocol.climb(),
+            Bench::Fig4 => protocol.ground_errors(),
+            Bench::Frontier => protocol.frontier(),
+            Bench::Map => protocol.maps(),
+            Bench::Speed => protocol.speed(),
+        }
+    }
+}
+
+/// One computation, to be done in a process of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// A name that no other case has; names its files.
+    pub name: String,
+    /// What is computed.
+    pub work: Work,
+    /// Kind of terrain.
+    pub terrain: String,
+    /// Level of the terrain, or the one that it departs from.
+    pub level: String,
+    /// Formulation, or method of the map.
+    pub method: String,
+    /// What the bench varies besides: name and value.
+    pub parameter: Option<(&'static str, f64)>,
+    /// Heading or direction of the goal θ, degrees, as the paper counts it: from +y to +x.
+    pub heading: Option<f64>,
+    /// The scenario file.
+    pub scenario: String,
+}
+
+struct Protocol<'a> {
+    options: &'a Options,
+}
+
+/// Where a motion starts and ends.
+struct Way {
+    label: String,
+    heading: Option<f64>,
+    start: [f64; 2],
+    goal: [f64; 2],
+}
+
+impl Protocol<'_> {
+    fn quick(&self) -> bool {
+        self.options.quick
+    }
+
+    fn levels(&self, default: &[&'static str]) -> Vec<String> {
+        match (self.options.levels.is_empty(), self.quick()) {
+            (false, _) => self.options.levels.clone(),
+            (true, true) => vec!["medium".into()],
+            (true, false) => default.iter().map(|&level| level.into()).collect(),
+        }
+    }
+
+    fn terrains<'b>(&self, of: &'b [&'static str]) -> impl Iterator<Item = &'b &'static str> {
+        of.iter()
+            .filter(|t| self.options.terrains.is_empty() || self.options.terrains.iter().any(|u| u == *t))
+    }
+
+    fn formulations(&self) -> Vec<String> {
+        match self.options.formulations.is_empty() {
+            true => FORMULATIONS.map(String::from).to_vec(),
+            false => self.options.formulations.clone(),
+        }
+    }
+
+    /// Table I.
+    fn table(&self, terrains: &[&'static str], levels: Vec<String>) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for level in &levels {
+            for terrain in self.terrains(terrains) {
+                for way in thinned(ways(terrain), self.quick()) {
+                    for formulation in &self.formulations() {
+                        cases.push(self.plan(Work::Plan, terrain, level, formulation, None, 10.0, &way));
+                    }
+                }
+            }
+        }
+        cases
+    }
+
+    /// Fig. 11: the climb to the top of the hill.
+    fn climb(&self) -> Vec<Case> {
+        let way = &ways("hilly")[5];
+        let one = |level: &String| {
+            let all = self.formulations().into_iter();
+            all.map(|f| self.plan(Work::Plan, "hilly", level, &f, None, 10.0, way)).collect::<Vec<_>>()
+        };
+        self.levels(&["medium"]).iter().flat_map(one).collect()
+    }
+
+    /// Success beyond the hard level.
+    fn frontier(&self) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for terrain in self.terrains(&TERRAINS) {
+            let (name, values) = steeper(terrain);
+            let values: Vec<f64> = if self.quick() { vec![values[0], values[4]] } else { values.to_vec() };
+            for value in values {
+                for way in thinned(ways(terrain), true) {
+                    for formulation in &self.formulations() {
+                        let parameter = Some((name, value));
+                        cases.push(self.plan(
+                            Work::Plan,
+                            terrain,
+                            "hard",
+                            formulation,
+                            parameter,
+                            10.0,
+                            &way,
+                        ));
+                    }
+                }
+            }
+        }
+        cases
+    }
+
+    /// The same way over the ripple, walked in more and more time.
+    fn speed(&self) -> Vec<Case> {
+        let horizons = if self.quick() { &HORIZONS[..2] } else { &HORIZONS[..] };
+        let way = &ways("rippled")[3];
+        let mut cases = Vec::new();
+        for level in &self.levels(&["medium"]) {
+            for &horizon in horizons {
+                for formulation in &self.formulations() {
+                    let parameter = Some(("horizon", horizon));
+                    cases.push(self.plan(
+                        Work::Speed,
+                        "rippled",
+                        level,
+                        formulation,
+                        parameter,
+                        horizon,
+                        way,
+                    ));
+                }
+            }
+        }
+        cases
+    }
+
+    fn maps(&self) -> Vec<Case> {
+        let methods = if self.quick() { &METHODS[..1] } else { &METHODS[..] };
+        let mut cases = Vec::new();
+        for level in &self.levels(&LEVELS) {
+            for terrain in self.terrains(&TERRAINS) {
+                cases.extend(methods.iter().map(|method| self.map(terrain, level, method)));
+            }
+        }
+        cases
+    }
+
+    fn ground_errors(&self) -> Vec<Case> {
+        let default: &[&'static str] =
+            if self.options.terrains.is_empty() { &["rippled"] } else { &TERRAINS };
+        let levels = self.levels(&["medium"]);
+        let one =
+            |level: &String| self.terrains(default).map(|t| self.map(t, level, "mips")).collect::<Vec<_>>();
+        levels.iter().flat_map(one).collect()
+    }
+
+    fn map(&self, terrain: &str, level: &str, method: &str) -> Case {
+        let name = format!("map-{terrain}-{level}-{method}");
+        let way = &ways(terrain)[0];
+        let scenario = self.scenario(&name, terrain, level, "warped", None, 10.0, way)
+            + &format!("method = \"{method}\"\n");
+        Case {
+            name,
+            work: Work::Map,
+            terrain: terrain.into(),
+            level: level.into(),
+            method: method.into(),
+            parameter: None,
+            heading: None,
+            scenario,
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn plan(
+        &self,
+        work: Work,
+        terrain: &str,
+        level: &str,
+        formulation: &str,
+        parameter: Option<(&'static str, f64)>,
+        horizon: f64,
+        way: &Way,
+    ) -> Case {
+        let varied = parameter.map_or(String::new(), |(key, value)| format!("-{key}-{value}"));
+        let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.options.robot, way.label);
+        let terrain_parameter = parameter.filter(|_| work == Work::Plan);
+        let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way);
+        Case {
+            name,
+            work,
+            terrain: terrain.into(),
+            level: level.into(),
+            method: formulation.into(),
+            parameter,
+            heading: way.heading,
+            scenario,
+        }
+    }
+
+    /// All that is not named has its default, for both formulations alike.
+    #[allow(clippy::too_many_arguments)]
+    fn scenario(
+        &self,
+        name: &str,
+        terrain: &str,
+        level: &str,
+        formulation: &str,
+        parameter: Option<(&'static str, f64)>,
+        horizon: f64,
+        way: &Way,
+    ) -> String {
+        let adhesive = if is_steep(terrain) { "\"LF\", \"RF\"" } else { "" };
+        let parameter = parameter.map_or(String::new(), |(key, value)| format!("{key} = {value:?}\n"));
+        // Cliffs need finer cells than slopes.
+        let cells = if terrain == "pit" { "64, 64, 16" } else { "48, 48, 16" };
+        let ([x, y], [u, v]) = (way.start, way.goal);
+        format!(
+            "# {name}, written by warpgait bench\n\
+             schema = 1\nformulation = \"{formulation}\"\nhorizon = {horizon:?}\n\n\
+             [robot]\nname = \"{}\"\nadhesive_feet = [{adhesive}]\n\n\
+             [terrain]\nkind = \"{terrain}\"\nlevel = \"{level}\"\n{parameter}\
+             extent = [-{RADIUS:?}, {RADIUS:?}, -{RADIUS:?}, {RADIUS:?}]\n\n\
+             [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
+             [solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
+             [map]\ncells = [{cells}]\n",
+            self.options.robot
+        )
+    }
+}
+
+/// Where the front feet may pull, as with the paper's suckers.
+fn is_steep(terrain: &str) -> bool {
+    matches!(terrain, "hilly" | "pit")
+}
+
+/// The ways of Section V on a terrain.
+fn ways(terrain: &str) -> Vec<Way> {
+    let half = 0.5 * RADIUS;
+    let heading = |i: usize, start: fn([f64; 2]) -> [f64; 2]| {
+        let theta = TAU * i as f64 / HEADINGS as f64;
+        let goal = [half * theta.sin(), half * theta.cos()];
+        let degrees = theta.to_degrees().round();
+        Way { label: format!("{degrees:03}"), heading: Some(degrees), start: start(goal), goal }
+    };
+    match terrain {
+        "rippled" => (0..HEADINGS).map(|i| heading(i, |_| [0.0, 0.0])).collect(),
+        "conic" => (0..HEADINGS).map(|i| heading(i, |[x, y]| [-x, -y])).collect(),
+        "hilly" => {
+            let way = |(i, &goal): (usize, &[f64; 2])| Way {
+                label: format!("goal-{i:02}"),
+                heading: None,
+                start: HILL_START,
+                goal,
+            };
+            HILL_GOALS.iter().enumerate().map(way).collect()
+        }
+        _ => (0..GOALS)
+            .map(|i| {
+                let angle = TAU * i as f64 / GOALS as f64;
+                Way {
+                    label: format!("goal-{i:02}"),
+                    heading: Some((450.0 - angle.to_degrees()) % 360.0),
+                    start: [0.0, 0.0],
+                    goal: [PIT_GOAL * angle.cos(), PIT_GOAL * angle.sin()],
+                }
+            })
+            .collect(),
+    }
+}
+
+/// A few of the ways, evenly chosen.
+fn thinned(ways: Vec<Way>, few: bool) -> Vec<Way> {
+    let step = if few { ways.len() / FEW } else { 1 };
+    ways.into_iter().step_by(step).collect()
+}
+
+/// What makes a terrain steeper than "hard", in eight steps.
+fn steeper(terrain: &str) -> (&'static str, [f64; 8]) {
+    match terrain {
+        // Greatest slope k A = 2.6 A.
+        "rippled" => ("amplitude", [0.30, 0.35, 0.40, 0.45, 0.50, 0.60, 0.70, 0.80]),
+        // Its flank is as steep as that; feet that do not pull slip beyond the friction coefficient, 0.75.
+        "conic" => ("slope", [0.72, 0.74, 0.76, 0.80, 0.85, 0.90, 1.00, 1.20]),
+        // Greatest slope H/(w √e) = 1.01 H.
+        "hilly" => ("height", [1.75, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5, 4.0]),
+        // Greatest slope about D/(2δ) = 5 D.
+        _ => ("depth", [1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{scenario, terrain};
+
+    #[test]
+    fn table_one_has_the_cases_of_the_paper() {
+        let options = Options { levels: vec!["medium".into()], ..Options::default() };
+        let cases = Bench::Table1.cases(&options);
+        let count = |terrain: &str, method: &str| {
+            cases.iter().filter(|c| c.terrain == terrain && c.method == method).count()
+        };
+        for method in FORMULATIONS {
+            assert_eq!(TERRAINS.map(|t| count(t, method)), [24, 24, 15, 15]);
+        }
+    }
+
+    #[test]
+    fn every_case_has_its_own_name_and_a_sound_scenario() {
+        for bench in Bench::ALL {
+            for quick in [false, true] {
+                let cases = bench.cases(&Options { quick, ..Options::default() });
+                assert!(!cases.is_empty());
+                let names: std::collections::BTreeSet<&str> = cases.iter().map(|c| c.name.as_str()).collect();
+                assert_eq!(names.len(), cases.len(), "{}", bench.name());
+                for case in &cases {
+                    let scenario = scenario::parse(&case.name, &case.scenario).unwrap();
+                    assert!(terrain::build(&coarse(scenario.terrain), ".".as_ref()).is_ok(), "{}", case.name);
+                }
+            }
+        }
+    }
+
+    /// The same ground on a coarse grid, quickly built.
+    fn coarse(spec: crate::scenario::TerrainSpec) -> crate::scenario::TerrainSpec {
+        crate::scenario::TerrainSpec { spacing: Some(0.2), ..spec }
+    }
+
+    #[test]
+    fn headings_are_the_papers() {
+        let ways = ways("conic");
+        assert_eq!(ways[6].label, "090");
+        let [x, y] = ways[6].goal;
+        assert!((x - 1.5).abs() < 1e-12 && y.abs() < 1e-12);
+        assert!((ways[6].start[0] + 1.5).abs() < 1e-12);
+        assert!((super::ways("pit")[0].heading.unwrap() - 90.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn filters_keep_what_was_asked_for() {
+        let options = Options {
+            terrains: vec!["pit".into()],
+            formulations: vec!["direct".into()],
+            quick: true,
+            ..Options::default()
+        };
+        let cases = Bench::Table1.cases(&options);
+        assert_eq!(cases.len(), 3);
+        assert!(cases.iter().all(|c| c.terrain == "pit" && c.method == "direct" && c.level == "medium"));
+    }
+}

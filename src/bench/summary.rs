@@ -1,0 +1,495 @@
+//! From rows to rates, medians and failures; CSV, JSON and the table for the terminal.
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::case::{Measured, MotionMeasured};
+use super::protocol::Bench;
+use super::sweep::Row;
+use super::{Options, Outcome};
+use crate::report::number;
+use crate::report::table::Table;
+use crate::{Error, Result};
+
+/// Cases that differ only in where the motion goes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Group {
+    /// Kind of terrain.
+    pub terrain: String,
+    /// Level, or the one departed from.
+    pub level: String,
+    /// Formulation, or method of the map.
+    pub method: String,
+    /// What is varied besides: name and value.
+    pub parameter: Option<(&'static str, f64)>,
+    /// Cases.
+    pub cases: usize,
+    /// Cases with a motion that meets the tolerance.
+    pub solved: usize,
+    /// … and all checks.
+    pub passed: usize,
+    /// Cases without any result.
+    pub without_result: usize,
+    /// Cases that needed a continuation.
+    pub continued: usize,
+    /// Median number of iterations of the solved ones.
+    pub iterations: Option<f64>,
+    /// Greatest number of iterations of the solved ones.
+    pub iterations_max: Option<f64>,
+    /// Median of the first iteration that met the tolerance.
+    pub first_feasible: Option<f64>,
+    /// Median processor time of guess and NLP, s, of all with a result.
+    pub cpu_solve: Option<f64>,
+    /// Greatest of it, s.
+    pub cpu_solve_max: Option<f64>,
+    /// Processor time of the map where it was built in one of the cases, s.
+    pub cpu_map: Option<f64>,
+    /// Median of the largest violations, units of the NLP.
+    pub violation: Option<f64>,
+    /// Greatest of them.
+    pub violation_max: Option<f64>,
+    /// Mean conformal error of the map on the ground, %.
+    pub conformal_error: Option<f64>,
+    /// Greatest distance of the map's bottom from the terrain, mm.
+    pub misfit: Option<f64>,
+}
+
+impl Group {
+    fn of(rows: &[&Row]) -> Self {
+        let case = &rows[0].case;
+        let measured: Vec<&Measured> = rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
+        let motions: Vec<&MotionMeasured> = measured.iter().filter_map(|m| m.motion.as_ref()).collect();
+        let solved: Vec<&MotionMeasured> = motions.iter().copied().filter(|m| m.solved).collect();
+        let of = |all: &[&MotionMeasured], value: fn(&MotionMeasured) -> f64| {
+            all.iter().map(|m| value(m)).collect()
+        };
+        let iterations: Vec<f64> = of(&solved, |m| m.iterations as f64);
+        let violations: Vec<f64> = of(&motions, |m| m.violation);
+        let cpu_solve: Vec<f64> =
+            measured.iter().filter(|m| m.motion.is_some()).map(|m| m.cpu.solve).collect();
+        let maps = || measured.iter().filter_map(|m| m.map.as_ref().map(|map| (m, map)));
+        Self {
+            terrain: case.terrain.clone(),
+            level: case.level.clone(),
+            method: case.method.clone(),
+            parameter: case.parameter,
+            cases: rows.len(),
+            solved: solved.len(),
+            passed: solved.iter().filter(|m| m.passed).count(),
+            without_result: rows.len() - measured.len(),
+            continued: motions.iter().filter(|m| m.continuation).count(),
+            iterations: median(&iterations),
+            iterations_max: greatest(&iterations),
+            first_feasible: median(
+                &solved.iter().filter_map(|m| Some(m.first_feasible? as f64)).collect::<Vec<_>>(),
+            ),
+            cpu_solve: median(&cpu_solve),
+            cpu_solve_max: greatest(&cpu_solve),
+            cpu_map: greatest(
+                &maps().filter(|(_, map)| !map.cached).map(|(m, _)| m.cpu.map).collect::<Vec<_>>(),
+            ),
+            violation: median(&violations),
+            violation_max: greatest(&violations),
+            conformal_error: greatest(
+                &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.mean).collect::<Vec<_>>(),
+            ),
+            misfit: greatest(&maps().map(|(_, map)| 1e3 * map.report.misfit_max).collect::<Vec<_>>()),
+        }
+    }
+}
+
+/// The groups, in the order of their first row.
+pub fn groups(rows: &[Row]) -> Vec<Group> {
+    let alike = |a: &Row, b: &Row| {
+        let (a, b) = (&a.case, &b.case);
+        (&a.terrain, &a.level, &a.method, a.parameter) == (&b.terrain, &b.level, &b.method, b.parameter)
+    };
+    let mut sorted: Vec<Vec<&Row>> = Vec::new();
+    for row in rows {
+        match sorted.iter_mut().find(|group| alike(group[0], row)) {
+            Some(group) => group.push(row),
+            None => sorted.push(vec![row]),
+        }
+    }
+    sorted.iter().map(|group| Group::of(group)).collect()
+}
+
+fn median(values: &[f64]) -> Option<f64> {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    if n == 0 { None } else { Some(0.5 * (values[(n - 1) / 2] + values[n / 2])) }
+}
+
+fn greatest(values: &[f64]) -> Option<f64> {
+    values.iter().copied().max_by(f64::total_cmp)
+}
+
+/// What became of a case, in a line.
+pub fn verdict(row: &Row) -> String {
+    let measured = match &row.outcome {
+        Ok(measured) => measured,
+        Err(reason) => return reason.clone(),
+    };
+    let Some(motion) = &measured.motion else {
+        return map_verdict(measured);
+    };
+    let effort = format!("{} iterations, {} s", motion.iterations, number(measured.cpu.solve));
+    match (&motion.check_error, failed_checks(motion)) {
+        _ if !motion.solved => format!(
+            "NOT SOLVED ({effort}): {}; {} misses by {}, {}",
+            motion.status,
+            motion.worst_block,
+            number(motion.violation),
+            motion.worst_place
+        ),
+        (Some(error), _) => format!("solved ({effort}), but cannot be checked: {error}"),
+        (None, failed) if failed.is_empty() => format!("solved, checks hold ({effort})"),
+        (None, failed) => format!("solved ({effort}), CHECK FAILS: {failed}"),
+    }
+}
+
+fn map_verdict(measured: &Measured) -> String {
+    measured.map.as_ref().map_or(String::new(), |map| {
+        let report = &map.report;
+        let folded = match report.inverted_points {
+            0 => String::new(),
+            n => format!(", FOLDED at {n} points"),
+        };
+        let ending = if report.converged { "" } else { ", NOT converged" };
+        format!(
+            "conformal error {} %, misfit {} mm, {} s{ending}{folded}",
+            number(100.0 * report.conformal_ground.mean),
+            number(1e3 * report.misfit_max),
+            number(measured.cpu.map)
+        )
+    })
+}
+
+/// The laws that do not hold, each with its value and limit.
+fn failed_checks(motion: &MotionMeasured) -> String {
+    let failed = motion.checks.iter().filter(|row| !row.passed);
+    let words = failed.map(|row| {
+        let foot = row.foot.as_ref().map_or(String::new(), |foot| format!(" {foot}"));
+        let time = row.time.map_or(String::new(), |time| format!(" at {time:.2} s"));
+        format!("{} {} > {} {}{foot}{time}", row.name, number(row.value), number(row.limit), row.unit)
+    });
+    words.collect::<Vec<_>>().join("; ")
+}
+
+/// Whether a row is as good as it can be.
+pub fn is_good(row: &Row) -> bool {
+    row.outcome.as_ref().is_ok_and(Measured::is_good)
+}
+
+/// The groups as a table, and the cases that fail with their reasons.
+pub fn table(outcome: &Outcome) -> String {
+    let mut lines =
+        match outcome.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|m| m.motion.is_some())) {
+            true => motion_table(outcome),
+            false => map_table(&outcome.groups),
+        };
+    let failing: Vec<&Row> = outcome.rows.iter().filter(|row| !is_good(row)).collect();
+    if !failing.is_empty() {
+        lines.push(format!("\n{} of {} cases fail:", failing.len(), outcome.rows.len()));
+        lines.extend(failing.iter().map(|row| format!("  {}: {}", row.case.name, verdict(row))));
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+fn motion_table(outcome: &Outcome) -> Vec<String> {
+    let mut table = Table::new(&[
+        "terrain",
+        "level",
+        "varied",
+        "formulation",
+        ">cases",
+        ">solved",
+        ">and checked",
+        ">continued",
+        ">iterations",
+        ">most",
+        ">feasible at",
+        ">solve CPU s",
+        ">most",
+        ">map CPU s",
+        ">violation",
+        ">most",
+    ]);
+    for group in &outcome.groups {
+        table.row([
+            group.terrain.clone(),
+            group.level.clone(),
+            group.parameter.map_or(String::new(), |(name, value)| format!("{name} {value}")),
+            group.method.clone(),
+            group.cases.to_string(),
+            share(group.solved, group.cases),
+            share(group.passed, group.cases),
+            group.continued.to_string(),
+            plain(group.iterations),
+            plain(group.iterations_max),
+            plain(group.first_feasible),
+            shown(group.cpu_solve),
+            shown(group.cpu_solve_max),
+            shown(group.cpu_map),
+            shown(group.violation),
+            shown(group.violation_max),
+        ]);
+    }
+    let mut lines = table.lines(|_, _, text| text);
+    lines.push("Medians, over solved cases for iterations; most: the greatest.".into());
+    lines.extend(evaluations(&outcome.rows));
+    lines
+}
+
+/// Where the time of an iteration goes, where that was measured.
+fn evaluations(rows: &[Row]) -> Vec<String> {
+    let mut table = Table::new(&[
+        "formulation",
+        ">horizon s",
+        ">variables",
+        ">constraints",
+        ">Jacobian entries",
+        ">Hessian entries",
+        ">constraints ms",
+        ">Jacobian ms",
+        ">Hessian ms",
+        ">evaluation s",
+        ">linear solver s",
+        ">total s",
+        ">iterations",
+    ]);
+    let mut any = false;
+    for row in rows {
+        let Some(motion) = row.outcome.as_ref().ok().and_then(|m| m.motion.as_ref()) else { continue };
+        let Some(evaluation) = &motion.evaluation else { continue };
+        any = true;
+        let [n, m, jacobian, hessian] = evaluation.size.map(|size| size.to_string());
+        let seconds = &motion.seconds;
+        let times = [evaluation.constraints, evaluation.jacobian, evaluation.hessian];
+        let parts = [seconds.evaluation, seconds.linear_solver, seconds.total];
+        let horizon = row.case.parameter.map_or(String::new(), |(_, value)| value.to_string());
+        let cells = [row.case.method.clone(), horizon, n, m, jacobian, hessian].into_iter();
+        let cells = cells.chain(times.map(number)).chain(parts.map(number));
+        table.row(cells.chain([motion.iterations.to_string()]));
+    }
+    match any {
+        true => std::iter::once("\nWall times, which other load on the machine lengthens:".into())
+            .chain(table.lines(|_, _, text| text))
+            .collect(),
+        false => Vec::new(),
+    }
+}
+
+fn map_table(groups: &[Group]) -> Vec<String> {
+    let mut table = Table::new(&["terrain", "level", "method", ">CPU s", ">conformal error %", ">misfit mm"]);
+    for group in groups {
+        let figures = [group.cpu_map, group.conformal_error, group.misfit].map(shown);
+        table.row(
+            [group.terrain.clone(), group.level.clone(), group.method.clone()].into_iter().chain(figures),
+        );
+    }
+    table.lines(|_, _, text| text)
+}
+
+fn share(part: usize, all: usize) -> String {
+    format!("{part} ({:.0} %)", 100.0 * part as f64 / all as f64)
+}
+
+fn shown(value: Option<f64>) -> String {
+    value.map_or("–".into(), number)
+}
+
+fn plain(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value}"))
+}
+
+/// `results.json`.
+pub(super) fn json(bench: Bench, options: &Options, rows: &[Row], groups: &[Group]) -> Result<String> {
+    let cases: Vec<serde_json::Value> = rows
+        .iter()
+        .map(|row| {
+            let case = &row.case;
+            json!({
+                "name": case.name,
+                "terrain": case.terrain,
+                "level": case.level,
+                "method": case.method,
+                "parameter": case.parameter,
+                "heading": case.heading,
+                "good": is_good(row),
+                "verdict": verdict(row),
+                "measured": row.outcome.as_ref().ok(),
+            })
+        })
+        .collect();
+    let results = json!({
+        "bench": bench.name(),
+        "version": env!("CARGO_PKG_VERSION"),
+        "robot": options.robot,
+        "machine": machine(),
+        "jobs": options.jobs,
+        "groups": groups,
+        "cases": cases,
+    });
+    serde_json::to_string_pretty(&results).map_err(|e| Error::Internal(format!("results: {e}")))
+}
+
+/// Model and number of the processors, as far as the operating system tells.
+fn machine() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let count = std::thread::available_parallelism().map_or(0, |n| n.get());
+    format!("{} × {count}", model.map_or("processor of unknown model", |(_, name)| name))
+}
+
+const COLUMNS: &str = "case,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
+    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,misfit_mm,\
+    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,verdict";
+
+/// `results.csv`: one row a case; what does not apply stays empty.
+pub(super) fn csv(rows: &[Row]) -> String {
+    let mut text = format!("{COLUMNS}\n");
+    for row in rows {
+        text += &csv_row(row).iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",");
+        text.push('\n');
+    }
+    text
+}
+
+fn csv_row(row: &Row) -> Vec<String> {
+    let case = &row.case;
+    let measured = row.outcome.as_ref().ok();
+    let motion = measured.and_then(|m| m.motion.as_ref());
+    let map = measured.and_then(|m| m.map.as_ref());
+    let evaluation = motion.and_then(|m| m.evaluation.as_ref());
+    vec![
+        case.name.clone(),
+        case.terrain.clone(),
+        case.level.clone(),
+        case.method.clone(),
+        cell(case.parameter.map(|(name, _)| name)),
+        cell(case.parameter.map(|(_, value)| value)),
+        cell(case.heading),
+        // A case without a result is not solved.
+        case_cell(row, motion.map(|m| m.solved)),
+        case_cell(row, motion.map(|m| m.solved && m.passed)),
+        cell(motion.map(|m| m.iterations)),
+        cell(motion.and_then(|m| m.first_feasible)),
+        cell(motion.map(|m| m.continuation)),
+        cell(motion.map(|m| m.violation)),
+        cell(motion.and(measured).map(|m| m.cpu.solve)),
+        cell(map.and(measured).map(|m| m.cpu.map)),
+        cell(map.map(|m| m.cached)),
+        cell(map.map(|m| m.report.seconds)),
+        cell(map.map(|m| 100.0 * m.report.conformal_ground.mean)),
+        cell(map.map(|m| 1e3 * m.report.misfit_max)),
+        cell(evaluation.map(|e| e.constraints)),
+        cell(evaluation.map(|e| e.jacobian)),
+        cell(evaluation.map(|e| e.hessian)),
+        cell(motion.map(|m| m.seconds.evaluation)),
+        cell(motion.map(|m| m.seconds.linear_solver)),
+        cell(motion.map(|m| m.seconds.total)),
+        verdict(row),
+    ]
+}
+
+fn cell(value: Option<impl ToString>) -> String {
+    value.map_or(String::new(), |value| value.to_string())
+}
+
+fn case_cell(row: &Row, value: Option<bool>) -> String {
+    if row.outcome.is_err() { "false".into() } else { cell(value) }
+}
+
+/// A cell of RFC 4180.
+fn quoted(cell: &str) -> String {
+    match cell.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::case::Cpu;
+    use crate::plan::CheckRow;
+
+    fn row(index: usize, motion: MotionMeasured, seconds: f64) -> Row {
+        let case = Bench::Table1.cases(&Options::default()).remove(2 * index);
+        let cpu = Cpu { solve: seconds, ..Cpu::default() };
+        Row { case, outcome: Ok(Measured { motion: Some(motion), map: None, cpu }) }
+    }
+
+    fn rows() -> Vec<Row> {
+        let good = MotionMeasured {
+            solved: true,
+            passed: true,
+            iterations: 10,
+            violation: 1e-5,
+            ..Default::default()
+        };
+        let checks = vec![CheckRow {
+            name: "friction".into(),
+            value: 2.0,
+            unit: "% m g".into(),
+            limit: 0.5,
+            passed: false,
+            time: Some(1.5),
+            foot: Some("LF".into()),
+        }];
+        let slips = MotionMeasured { passed: false, iterations: 20, checks, ..good.clone() };
+        let lost = MotionMeasured {
+            solved: false,
+            status: "too, many \"iterations\"".into(),
+            worst_block: "reach".into(),
+            violation: 0.3,
+            ..good.clone()
+        };
+        let mut broken = row(3, good.clone(), 0.0);
+        broken.outcome = Err("no result (signal: 9)".into());
+        vec![row(0, good, 1.0), row(1, slips, 3.0), row(2, lost, 9.0), broken]
+    }
+
+    #[test]
+    fn a_group_counts_every_case() {
+        let groups = groups(&rows());
+        assert_eq!(groups.len(), 1);
+        let group = &groups[0];
+        assert_eq!((group.cases, group.solved, group.passed, group.without_result), (4, 2, 1, 1));
+        assert_eq!(
+            (group.iterations, group.cpu_solve, group.cpu_solve_max),
+            (Some(15.0), Some(3.0), Some(9.0))
+        );
+        assert_eq!(group.violation_max, Some(0.3));
+    }
+
+    #[test]
+    fn verdicts_name_the_law_the_block_and_the_reason() {
+        let words: Vec<String> = rows().iter().map(verdict).collect();
+        assert!(words[0].starts_with("solved, checks hold"));
+        assert!(words[1].contains("friction 2.00 > 0.500 % m g LF at 1.50 s"), "{}", words[1]);
+        assert!(words[2].starts_with("NOT SOLVED") && words[2].contains("reach misses by 0.300"));
+        assert_eq!(words[3], "no result (signal: 9)");
+    }
+
+    #[test]
+    fn csv_has_as_many_cells_as_columns() {
+        let rows = rows();
+        assert_eq!(csv_row(&rows[3]).len(), COLUMNS.split(',').count());
+        let text = csv(&rows);
+        assert_eq!(text.lines().count(), 5);
+        assert!(text.lines().nth(3).unwrap().ends_with('"'));
+        assert!(text.lines().nth(4).unwrap().contains(",false,false,"));
+        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[4.0, 1.0]), Some(2.5));
+    }
+}

@@ -1,0 +1,106 @@
+//! `warpgait bench`: rows whatever happens, results kept and gone on from, bad input refused.
+
+use std::path::Path;
+use std::process::Command;
+
+use assert_cmd::cargo::cargo_bin;
+use serde_json::Value;
+
+fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output = Command::new(cargo_bin("warpgait")).current_dir(folder).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+fn results(folder: &Path, bench: &str) -> Value {
+    let path = folder.join("bench").join(bench).join("results.json");
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        ["bench", "table1", "--quick", "--terrain", "rippled", "--formulation", "direct", "--level", "easy"];
+    let (code, out, err) = warpgait(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("3 (100 %)") && out.contains("results.csv"), "{out}");
+    assert!(err.contains("3 of 3 cases (0 from before)"), "{err}");
+    let first = results(folder.path(), "table1");
+    let motion = &first["cases"][0]["measured"]["motion"];
+    assert_eq!(motion["solved"], true);
+    let history = motion["history"].as_array().unwrap();
+    assert_eq!(history.len() as u64, motion["iterations"].as_u64().unwrap() + 1);
+    let cpu = first["cases"][0]["measured"]["cpu"]["solve"].as_f64().unwrap();
+    assert!(cpu > 0.01 && cpu < 100.0, "{cpu}");
+
+    let case = folder.path().join("bench/cases/anymal_towr-rippled-easy-000-direct.json");
+    std::fs::write(&case, "{").unwrap();
+    let (code, _, err) = warpgait(folder.path(), &arguments);
+    assert_eq!(code, 0);
+    assert!(err.contains("3 of 3 cases (2 from before)"), "{err}");
+    let second = results(folder.path(), "table1");
+    // The kept rows are the very same, times included; the one computed again took the same way.
+    assert_eq!(second["cases"][1], first["cases"][1]);
+    assert_eq!(second["cases"][0]["measured"]["motion"]["iterations"], motion["iterations"]);
+    let svg = std::fs::read_to_string(folder.path().join("bench/table1/table1.svg")).unwrap();
+    assert!(svg.starts_with("<svg"));
+}
+
+#[test]
+fn a_case_that_comes_to_nothing_is_a_row_with_its_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["bench", "map", "--level", "easy", "--terrain", "conic", "--json"];
+    let (code, out, _) = warpgait(folder.path(), &arguments);
+    assert_eq!(code, 0);
+    let printed: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(printed["bench"], "map");
+    let results = results(folder.path(), "map");
+    let cases = results["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 6);
+    let shear = cases.iter().find(|case| case["method"] == "shear").unwrap();
+    assert!(shear["measured"]["map"]["report"]["misfit_max"].is_number(), "{shear}");
+    for case in cases.iter().filter(|case| case["measured"].is_null()) {
+        let verdict = case["verdict"].as_str().unwrap();
+        assert!(verdict.contains("no result (exit status: 2): error:"), "{verdict}");
+    }
+    let csv = std::fs::read_to_string(folder.path().join("bench/map/results.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 7);
+}
+
+#[test]
+fn a_case_that_takes_too_long_is_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    // The steepest map takes seconds on any machine.
+    let arguments = ["bench", "fig4", "--level", "hard", "--terrain", "pit", "--time-limit", "1"];
+    let (code, out, _) = warpgait(folder.path(), &arguments);
+    assert_eq!(code, 0);
+    assert!(out.contains("1 of 1 cases fail") && out.contains("took longer than 1 s"), "{out}");
+}
+
+#[test]
+fn the_process_of_a_case_fails_loudly() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), "schema = 1\n").unwrap();
+    let (code, out, err) = warpgait(folder.path(), &["bench-case", "plan", "s.toml", "p.npz", "r.json"]);
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(err.contains("terrain"), "{err}");
+    assert!(!folder.path().join("r.json").exists());
+}
+
+#[test]
+fn bad_input_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, part) in [
+        (&["bench", "table2"][..], "table1"),
+        (&["bench", "table1", "--jobs", "0"], "1..=256"),
+        (&["bench", "table1", "--robot", "dog"], "anymal_towr"),
+        (&["bench", "table1", "--level", "medium,steep"], "steep"),
+        (&["bench", "fig8", "--terrain", "pit"], "nothing is left to run"),
+    ] {
+        let (code, out, err) = warpgait(folder.path(), arguments);
+        assert_eq!((code, out.as_str()), (2, ""), "{arguments:?}: {err}");
+        assert!(err.contains(part), "{arguments:?}: {err}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
