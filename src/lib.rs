@@ -52,6 +52,7 @@
 //! | [`plan`] | the motion | samples at ten times the rate, exact splines and provenance in one `.npz` file |
 //! | [`check`] | a plan file alone | every law again, by other code, between the samples too |
 //! | [`report`] | plan, checks | tables and drawings |
+//! | [`pipeline`] | a scenario | all of the above in order |
 //! | [`bench`] | the paper's protocol | its tables and figures, and speed |
 //! | [`cli`] | arguments | exit codes |
 //!
@@ -83,6 +84,7 @@ pub mod error;
 pub mod heightfield;
 pub mod ipopt;
 pub mod nlp;
+pub mod pipeline;
 pub mod plan;
 pub mod report;
 pub mod robot;

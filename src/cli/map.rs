@@ -10,11 +10,11 @@ use super::Ending;
 use super::console::Console;
 use super::progress::Progress;
 use crate::heightfield::Heightfield;
-use crate::ipopt::INTERRUPT;
+use crate::pipeline::{self, Built};
 use crate::plan::npz::{NpzWriter, ensure_writable};
 use crate::report::map_table;
-use crate::scenario::{self, MapSpec};
-use crate::warp::{self, MapReport, WarpMap};
+use crate::scenario;
+use crate::warp::{MapReport, WarpMap};
 use crate::{Error, Result, terrain};
 
 #[derive(Debug, Args)]
@@ -41,9 +41,12 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir)?;
     let mut progress = Progress::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
-    let Some(built) = build(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut progress)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let built =
+        pipeline::build_map(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut |event| {
+            progress.show(event);
+            ControlFlow::Continue(())
+        })?;
+    let Some(built) = built else { return Ok(Ending::Interrupted) };
     drop(progress);
     let Built { map, report, cached } = &built;
     if let Some(output) = &arguments.output {
@@ -63,39 +66,6 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
         "report": report,
     }));
     Ok(if sound { Ending::Good } else { Ending::NotGood })
-}
-
-/// A map and how it came about.
-pub(super) struct Built {
-    pub map: WarpMap,
-    pub report: MapReport,
-    pub cached: bool,
-}
-
-/// Builds the map, or takes it from the cache; none when Ctrl-C came.
-pub(super) fn build(
-    field: &Heightfield,
-    spec: &MapSpec,
-    with_cache: bool,
-    progress: &mut Progress,
-) -> Result<Option<Built>> {
-    let folder = if with_cache { warp::default_cache_dir() } else { None };
-    let found = warp::build_cached(field, spec, folder.as_deref(), &mut |at| {
-        let [x, y, z] = at.cells;
-        progress.update(
-            &format!("map {x}×{y}×{z}"),
-            &format!("iteration {}, decrement {:.1e} of {:.1e}", at.iteration, at.decrement, at.tolerance),
-        );
-        if INTERRUPT.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    match found {
-        Err(_) if INTERRUPT.is_raised() => Ok(None),
-        found => {
-            let (map, report, cached) = found?;
-            report.warnings.iter().for_each(|warning| progress.note(&format!("map: {warning}")));
-            Ok(Some(Built { map, report, cached }))
-        }
-    }
 }
 
 /// The map's members as in a plan, its ground, and the report as `meta`.

@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::pipeline::Event;
+
 /// Between two plain lines of the same stage.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(5);
 
@@ -30,8 +32,32 @@ impl Progress {
         Self { line, quiet, stage: String::new(), shown: None }
     }
 
+    /// Shows what is going on.
+    pub fn show(&mut self, event: &Event) {
+        match event {
+            Event::Stage(stage) => self.update(stage, ""),
+            Event::Note(text) => self.note(text),
+            Event::Map(at) => {
+                let [x, y, z] = at.cells;
+                let detail = format!(
+                    "iteration {}, decrement {:.1e} of {:.1e}",
+                    at.iteration, at.decrement, at.tolerance
+                );
+                self.update(&format!("map {x}×{y}×{z}"), &detail);
+            }
+            Event::Iteration(at) => {
+                let record = at.record;
+                let detail = format!(
+                    "iteration {}, violation {:.1e}, objective {:.3e}",
+                    at.iteration, record.violation, record.objective
+                );
+                self.update(at.stage, &detail);
+            }
+        }
+    }
+
     /// Shows where a stage stands.
-    pub fn update(&mut self, stage: &str, detail: &str) {
+    fn update(&mut self, stage: &str, detail: &str) {
         if self.quiet {
             return;
         }

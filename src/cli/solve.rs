@@ -1,34 +1,26 @@
 //! `warpgait solve`: terrain → map → NLP → plan → check.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
-use sha2::{Digest, Sha256};
 
 use super::console::Console;
 use super::progress::Progress;
-use super::{Ending, beside, check, map};
-use crate::check::{CheckReport, check as check_plan};
-use crate::ipopt::NlpProblem;
-use crate::nlp::derivatives::{self, DerivativeError};
-use crate::nlp::solve::{self as nlp, Motion};
+use super::{Ending, beside, check};
+use crate::check::CheckReport;
+use crate::nlp::derivatives::DerivativeError;
+use crate::nlp::solve::Motion;
+use crate::pipeline::{self, Outcome};
 use crate::plan::Plan;
 use crate::plan::npz::{ensure_writable, write_atomically};
-use crate::plan::sampled::Provenance;
-use crate::robot::Robot;
-use crate::scenario::{self, Formulation, LoadedScenario};
-use crate::terrain::{self, Ground};
+use crate::scenario::{self, LoadedScenario};
 use crate::{Error, Result, report};
 
 /// Derivatives that differ more than this from central differences are wrong.
 const DERIVATIVE_TOLERANCE: f64 = 1e-4;
-/// So many variables are moved in a check of the derivatives.
-const DERIVATIVE_VARIABLES: usize = 200;
 
 #[derive(Debug, Args)]
 pub(super) struct SolveArguments {
@@ -64,55 +56,16 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     for file in [Some(&output), plot.as_ref()].into_iter().flatten() {
         ensure_writable(file)?;
     }
-    let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
-    phases_match(&loaded, &robot)?;
-    nlp::validate(scenario)?;
     super::listen_for_ctrl_c()?;
 
     let mut progress = Progress::new(console.is_quiet());
-    progress.update("terrain", "");
-    let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
-    loaded.ensure_inside(ground.field.extent())?;
-    ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
-    let inputs = inputs(&loaded, &mut ground)?;
-
-    let map_start = Instant::now();
-    let built = match scenario.formulation {
-        Formulation::Direct => None,
-        Formulation::Warped => match map::build(&ground.field, &scenario.map, true, &mut progress)? {
-            Some(built) => Some(built),
-            // Without a map there is no iterate to keep.
-            None => return Ok(Ending::Interrupted),
-        },
-    };
-    let map_seconds = map_start.elapsed().as_secs_f64();
-    let warp = built.as_ref().map(|built| &built.map);
-    let field = Arc::new(ground.field.clone());
-
-    let derivatives = match arguments.check_derivatives {
-        true => {
-            progress.update("derivatives", "");
-            let mut problem = nlp::problem(scenario, &robot, &field, warp)?;
-            Some(check_derivatives(&mut problem)?)
-        }
-        false => None,
-    };
-
-    let motion = nlp::solve(scenario, &robot, &field, warp, &mut |at| {
-        let record = at.record;
-        let detail = format!(
-            "iteration {}, violation {:.1e}, objective {:.3e}",
-            at.iteration, record.violation, record.objective
-        );
-        progress.update(at.stage, &detail);
+    let outcome = pipeline::run(&loaded, arguments.check_derivatives, &mut |event| {
+        progress.show(event);
         ControlFlow::Continue(())
     })?;
-    progress.update("plan", "");
-    let text = &loaded.text;
-    let provenance = Provenance { scenario, text, robot: &robot, ground: &ground, inputs, map_seconds };
-    let mut plan = Plan::from_motion(&motion, &provenance);
-    let found = check_plan(&plan)?;
-    plan.meta.checks = found.rows.clone();
+    // Without a map there is no iterate to keep.
+    let Some(outcome) = outcome else { return Ok(Ending::Interrupted) };
+    let Outcome { plan, motion, check: found, ground, map: built, derivatives } = outcome;
     plan.write(&output)?;
     if let Some(plot) = &plot {
         write_atomically(plot, report::sheet(&plan).as_bytes())?;
@@ -133,7 +86,7 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
         "passed": found.passed,
         "interrupted": motion.interrupted,
         "solver": plan.meta.solver,
-        "terrain": ground.report,
+        "terrain": ground,
         "map": built.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
         "violations": motion.violations,
         "derivatives": derivatives,
@@ -162,43 +115,6 @@ fn output(arguments: &SolveArguments) -> Result<PathBuf> {
             Err(Error::input(format!("{}: not the name of a file", arguments.scenario.display())))
         }
     }
-}
-
-fn phases_match(loaded: &LoadedScenario, robot: &Robot) -> Result<()> {
-    match &loaded.scenario.gait.phases {
-        Some(rows) if rows.len() != robot.feet.len() => {
-            let names: Vec<&str> = robot.feet.iter().map(|foot| foot.name.as_str()).collect();
-            let what = format!("given {} rows, allowed: one by foot, for {}", rows.len(), names.join(", "));
-            Err(loaded.error("gait.phases", what))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// SHA-256 of every file that goes in.
-fn inputs(loaded: &LoadedScenario, ground: &mut Ground) -> Result<BTreeMap<String, String>> {
-    let mut inputs: BTreeMap<String, String> = ground.inputs.drain(..).collect();
-    let robot = loaded.scenario.robot.file.as_ref().map(|file| (file.clone(), loaded.base_dir.join(file)));
-    let scenario =
-        loaded.path.file_name().map(|name| (name.to_string_lossy().into_owned(), loaded.path.clone()));
-    for (name, path) in robot.into_iter().chain(scenario) {
-        inputs.insert(name, sha256(&path)?);
-    }
-    Ok(inputs)
-}
-
-fn sha256(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    Ok(Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
-/// At the guess, in directions spread over all variables.
-fn check_derivatives(problem: &mut crate::nlp::Problem) -> Result<Vec<DerivativeError>> {
-    let n = problem.num_variables();
-    let mut x = vec![0.0; n];
-    problem.initial_point(&mut x);
-    let variables: Vec<usize> = (0..n).step_by(n.div_ceil(DERIVATIVE_VARIABLES).max(1)).collect();
-    Ok(derivatives::check(problem, &x, &variables))
 }
 
 fn is_right(error: &DerivativeError) -> bool {

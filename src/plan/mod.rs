@@ -1,5 +1,6 @@
 //! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
 
+pub mod exact;
 pub mod npz;
 mod read;
 pub mod sampled;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan, Seconds, WarpedSamples};
 use crate::nlp::model::GRAVITY;
@@ -48,19 +48,14 @@ impl Plan {
             foot_position: vec![],
             foot_force: vec![],
         };
-        let mut last = UnitQuaternion::identity();
+        let mut quaternion = [1.0, 0.0, 0.0, 0.0];
         for n in 0..count {
             let k = n as f64 / SAMPLES_A_STEP as f64;
             let base = sampling::base(layout, space, x, k);
-            let mut q =
-                UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(base.rotation));
-            if n > 0 && q.coords.dot(&last.coords) < 0.0 {
-                q = UnitQuaternion::new_unchecked(-q.into_inner());
-            }
-            last = q;
+            quaternion = base.quaternion_wxyz(quaternion);
             plan.t.push(k * layout.time_step);
             plan.base_position.push(base.position.into());
-            plan.base_quaternion_wxyz.push([q.w, q.i, q.j, q.k]);
+            plan.base_quaternion_wxyz.push(quaternion);
             plan.base_linear_velocity.push(base.velocity.into());
             plan.base_linear_acceleration.push(base.acceleration.into());
             plan.base_angular_velocity.push(base.angular_velocity.into());

@@ -15,8 +15,8 @@ pub struct LoadedScenario {
     pub text: String,
     /// Relative paths in the scenario are relative to this folder.
     pub base_dir: PathBuf,
-    /// The file.
-    pub path: PathBuf,
+    /// The file, if it came from one.
+    pub path: Option<PathBuf>,
     document: Document,
 }
 
@@ -36,7 +36,30 @@ impl LoadedScenario {
 /// word is a string). Refuses, with file, line, key, what was given and what is allowed: malformed TOML, unknown keys,
 /// wrong types, values out of range, NaN and infinity, another schema, and values that do not go together.
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScenario> {
-    let (mut document, mut text) = Document::read(path)?;
+    let (document, text) = Document::read(path)?;
+    let base_dir = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
+        _ => PathBuf::from("."),
+    };
+    let name = path.display().to_string();
+    Ok(LoadedScenario {
+        path: Some(path.to_path_buf()),
+        ..assemble(document, &name, text, base_dir, overrides)?
+    })
+}
+
+/// As [`load`], for a scenario that is in memory; its relative paths are relative to `base_dir`, `name` is for messages.
+pub fn load_text(name: &str, text: &str, base_dir: &Path, overrides: &[String]) -> Result<LoadedScenario> {
+    assemble(Document::parse(name, text)?, name, text.to_owned(), base_dir.to_path_buf(), overrides)
+}
+
+fn assemble(
+    mut document: Document,
+    name: &str,
+    mut text: String,
+    base_dir: PathBuf,
+    overrides: &[String],
+) -> Result<LoadedScenario> {
     for assignment in overrides {
         document.set(assignment)?;
     }
@@ -44,13 +67,9 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScenario> {
     if !overrides.is_empty() {
         let body =
             toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?;
-        text = format!("# {} with --set {}\n{body}", path.display(), overrides.join(" --set "));
+        text = format!("# {name} with --set {}\n{body}", overrides.join(" --set "));
     }
-    let base_dir = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    Ok(LoadedScenario { scenario, text, base_dir, path: path.to_path_buf(), document })
+    Ok(LoadedScenario { scenario, text, base_dir, path: None, document })
 }
 
 /// Parses the text of a scenario, as a plan carries it; `file` is the name for messages.

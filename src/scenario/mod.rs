@@ -8,7 +8,7 @@ mod template;
 mod tests;
 mod validate;
 
-pub use load::{LoadedScenario, load, parse};
+pub use load::{LoadedScenario, load, load_text, parse};
 pub(crate) use schema::closest as closest_word;
 pub use schema::json_schema;
 pub use template::template;

@@ -1,6 +1,6 @@
 //! The motion at any time, in ambient space, with exact velocities and accelerations: what plans are made of.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::layout::Layout;
 use super::rotation::RotationJet;
@@ -24,6 +24,16 @@ pub struct BaseMotion {
     pub angular_acceleration: Vector3<f64>,
     /// (p̄, θ̄).
     pub variables: [f64; 6],
+}
+
+impl BaseMotion {
+    /// R as a unit quaternion w, x, y, z; of the two that it may be, the one nearer to `near`.
+    pub fn quaternion_wxyz(&self, near: [f64; 4]) -> [f64; 4] {
+        let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation));
+        let q = [q.w, q.i, q.j, q.k];
+        let dot: f64 = q.iter().zip(&near).map(|(a, b)| a * b).sum();
+        if dot < 0.0 { q.map(|v| -v) } else { q }
+    }
 }
 
 /// A foot at one time, world frame.

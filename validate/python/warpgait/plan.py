@@ -131,6 +131,8 @@ def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
         with archive:
             for member in archive.files:
                 arrays[member] = archive[member]
+    except InputError:
+        raise
     except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:
         where = f"member {member}: " if member else ""
         raise InputError(f"{path}: {where}not readable as a plan (damaged or not an .npz archive): {error}") from error

@@ -1,0 +1,187 @@
+//! From a scenario to a checked plan: terrain → map → NLP → plan → check. What `warpgait solve` and Python's
+//! `warpgait.solve` both do.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use sha2::{Digest, Sha256};
+
+use crate::check::{CheckReport, check};
+use crate::heightfield::Heightfield;
+use crate::ipopt::{INTERRUPT, NlpProblem};
+use crate::nlp::derivatives::{self, DerivativeError};
+use crate::nlp::solve::{self as nlp, Motion};
+use crate::plan::Plan;
+use crate::plan::sampled::Provenance;
+use crate::robot::Robot;
+use crate::scenario::{Formulation, LoadedScenario, MapSpec};
+use crate::terrain::{self, Ground, GroundReport};
+use crate::warp::{self, MapProgress, MapReport, WarpMap};
+use crate::{Error, Result};
+
+/// So many variables are moved in a check of the derivatives.
+const DERIVATIVE_VARIABLES: usize = 200;
+
+/// What is going on, for people who wait.
+#[derive(Clone, Debug)]
+pub enum Event<'a> {
+    /// A stage begins that tells nothing more.
+    Stage(&'a str),
+    /// Something worth keeping.
+    Note(&'a str),
+    /// An iteration of the map.
+    Map(MapProgress),
+    /// An iteration of the NLP.
+    Iteration(nlp::Progress<'a>),
+}
+
+/// Called at every event; may ask to stop, which is heard at the iterations.
+pub type Observer<'a> = dyn FnMut(&Event) -> ControlFlow<()> + 'a;
+
+/// A map and how it came about.
+pub struct Built {
+    /// φ
+    pub map: WarpMap,
+    /// Its quality.
+    pub report: MapReport,
+    /// It was taken from the cache.
+    pub cached: bool,
+}
+
+/// All that came out of a scenario.
+pub struct Outcome {
+    /// The plan, with what the check said.
+    pub plan: Plan,
+    /// What it was sampled from.
+    pub motion: Motion,
+    /// The check in full.
+    pub check: CheckReport,
+    /// How the terrain came about.
+    pub ground: GroundReport,
+    /// The map, in the warped formulation.
+    pub map: Option<Built>,
+    /// Derivatives against differences, when asked for.
+    pub derivatives: Option<Vec<DerivativeError>>,
+}
+
+/// Plans the motion of a scenario and checks it; none when it was stopped before there was an iterate to keep.
+///
+/// # Errors
+/// For input that is wrong or files that cannot be read. A solve that does not converge is not an error: the plan says so.
+pub fn run(
+    loaded: &LoadedScenario,
+    check_derivatives: bool,
+    observer: &mut Observer,
+) -> Result<Option<Outcome>> {
+    let scenario = &loaded.scenario;
+    let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
+    phases_match(loaded, &robot)?;
+    nlp::validate(scenario)?;
+
+    // Whoever wishes to stop is asked again at the first iteration.
+    let _ = observer(&Event::Stage("terrain"));
+    let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
+    loaded.ensure_inside(ground.field.extent())?;
+    for note in &ground.report.notes {
+        let _ = observer(&Event::Note(&format!("terrain: {note}")));
+    }
+    let inputs = inputs(loaded, &mut ground)?;
+
+    let start = Instant::now();
+    let map = match scenario.formulation {
+        Formulation::Direct => None,
+        Formulation::Warped => match build_map(&ground.field, &scenario.map, true, observer)? {
+            Some(built) => Some(built),
+            None => return Ok(None),
+        },
+    };
+    let map_seconds = start.elapsed().as_secs_f64();
+    let warp = map.as_ref().map(|built| &built.map);
+    let field = Arc::new(ground.field.clone());
+
+    let derivatives = match check_derivatives {
+        true => {
+            let _ = observer(&Event::Stage("derivatives"));
+            let mut problem = nlp::problem(scenario, &robot, &field, warp)?;
+            Some(compare_derivatives(&mut problem))
+        }
+        false => None,
+    };
+    let motion =
+        nlp::solve(scenario, &robot, &field, warp, &mut |at| observer(&Event::Iteration(at.clone())))?;
+    let _ = observer(&Event::Stage("plan"));
+    let text = &loaded.text;
+    let provenance = Provenance { scenario, text, robot: &robot, ground: &ground, inputs, map_seconds };
+    let mut plan = Plan::from_motion(&motion, &provenance);
+    let check = check(&plan)?;
+    plan.meta.checks = check.rows.clone();
+    Ok(Some(Outcome { plan, motion, check, ground: ground.report, map, derivatives }))
+}
+
+/// Builds the map, or takes it from the cache; none when it was stopped.
+///
+/// # Errors
+/// Those of [`warp::build`].
+pub fn build_map(
+    field: &Heightfield,
+    spec: &MapSpec,
+    with_cache: bool,
+    observer: &mut Observer,
+) -> Result<Option<Built>> {
+    let folder = if with_cache { warp::default_cache_dir() } else { None };
+    let mut stopped = false;
+    let found = warp::build_cached(field, spec, folder.as_deref(), &mut |at| {
+        stopped = observer(&Event::Map(at)).is_break() || INTERRUPT.is_raised();
+        if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    if stopped {
+        return Ok(None);
+    }
+    let (map, report, cached) = found?;
+    for warning in &report.warnings {
+        let _ = observer(&Event::Note(&format!("map: {warning}")));
+    }
+    Ok(Some(Built { map, report, cached }))
+}
+
+fn phases_match(loaded: &LoadedScenario, robot: &Robot) -> Result<()> {
+    match &loaded.scenario.gait.phases {
+        Some(rows) if rows.len() != robot.feet.len() => {
+            let names: Vec<&str> = robot.feet.iter().map(|foot| foot.name.as_str()).collect();
+            let what = format!("given {} rows, allowed: one by foot, for {}", rows.len(), names.join(", "));
+            Err(loaded.error("gait.phases", what))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// SHA-256 of every file that goes in.
+fn inputs(loaded: &LoadedScenario, ground: &mut Ground) -> Result<BTreeMap<String, String>> {
+    let mut inputs: BTreeMap<String, String> = ground.inputs.drain(..).collect();
+    let robot = loaded.scenario.robot.file.as_ref().map(|file| (file.clone(), loaded.base_dir.join(file)));
+    let scenario = loaded
+        .path
+        .as_ref()
+        .and_then(|path| path.file_name().map(|name| (name.to_string_lossy().into_owned(), path.clone())));
+    for (name, path) in robot.into_iter().chain(scenario) {
+        inputs.insert(name, sha256(&path)?);
+    }
+    Ok(inputs)
+}
+
+fn sha256(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    Ok(Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// At the guess, in directions spread over all variables.
+fn compare_derivatives(problem: &mut crate::nlp::Problem) -> Vec<DerivativeError> {
+    let n = problem.num_variables();
+    let mut x = vec![0.0; n];
+    problem.initial_point(&mut x);
+    let variables: Vec<usize> = (0..n).step_by(n.div_ceil(DERIVATIVE_VARIABLES).max(1)).collect();
+    derivatives::check(problem, &x, &variables)
+}

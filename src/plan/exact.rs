@@ -1,0 +1,211 @@
+//! The motion of a plan at any time, exactly: the splines that were optimised, not its samples.
+
+use super::{NamedArray, Plan};
+use crate::heightfield::Heightfield;
+use crate::trajectory::gait::{Gait, Swing};
+use crate::trajectory::layout::Layout;
+use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
+use crate::trajectory::space::Space;
+use crate::warp::WarpMap;
+use crate::{Error, Result};
+
+/// Times this much outside the plan, s, are taken for its ends.
+const TIME_TOLERANCE: f64 = 1e-9;
+
+/// A plan's splines, put together again as the variables they were, with forces in N.
+#[derive(Clone, Debug)]
+pub struct ExactMotion {
+    layout: Layout,
+    space: Space,
+    x: Vec<f64>,
+}
+
+impl ExactMotion {
+    /// The horizon, s.
+    pub fn duration(&self) -> f64 {
+        self.layout.intervals as f64 * self.layout.time_step
+    }
+
+    /// Number of feet.
+    pub fn feet(&self) -> usize {
+        self.layout.feet.len()
+    }
+
+    /// The base at `t` in s, world frame.
+    ///
+    /// # Errors
+    /// For a time outside the plan.
+    pub fn base(&self, t: f64) -> Result<BaseMotion> {
+        Ok(sampling::base(&self.layout, &self.space, &self.x, self.sample(t)?))
+    }
+
+    /// Foot `i` at `t` in s, world frame, its forces in N.
+    ///
+    /// # Errors
+    /// For a time outside the plan, and for a foot that it does not have.
+    pub fn foot(&self, i: usize, t: f64) -> Result<FootMotion> {
+        if i >= self.feet() {
+            return Err(Error::input(format!("foot {i}: the plan has {} feet, counted from 0", self.feet())));
+        }
+        Ok(sampling::foot(&self.layout, &self.space, &self.x, i, self.sample(t)?))
+    }
+
+    /// A time in samples of the NLP; near a sample it is that sample, where a foot's phase may switch.
+    fn sample(&self, t: f64) -> Result<f64> {
+        let end = self.duration();
+        if !(-TIME_TOLERANCE..=end + TIME_TOLERANCE).contains(&t) {
+            return Err(Error::input(format!("t = {t} s: the plan goes from 0 to {end} s")));
+        }
+        let k = t / self.layout.time_step;
+        let near = k.round();
+        let k = if (k - near).abs() * self.layout.time_step < TIME_TOLERANCE { near } else { k };
+        Ok(k.clamp(0.0, self.layout.intervals as f64))
+    }
+}
+
+impl Plan {
+    /// The exact motion, from the members `spline/…`, the phases and the map.
+    ///
+    /// # Errors
+    /// When a spline is missing or they do not fit together.
+    pub fn motion(&self) -> Result<ExactMotion> {
+        let (shape, base) = self.spline("base_control_points")?;
+        let &[points, 6] = shape else {
+            return Err(wrong(
+                "base_control_points",
+                format!("shape {shape:?}, expected (intervals + 3, 6)"),
+            ));
+        };
+        let (shape, knots) = self.spline("base_knots")?;
+        if points < 5 || shape != [points + 4] {
+            let what = format!(
+                "shape {shape:?} with {points} control points, expected 4 more than these, at least 5"
+            );
+            return Err(wrong("base_knots", what));
+        }
+        let intervals = points - 3;
+        let time_step = (knots[3 + intervals] - knots[3]) / intervals as f64;
+        let uniform = |i: usize| (i as f64 - 3.0) * time_step;
+        if !(time_step.is_finite() && time_step > 0.0)
+            || (0..knots.len()).any(|i| (knots[i] - uniform(i)).abs() > 1e-6 * time_step)
+        {
+            return Err(wrong("base_knots", "not uniform with knot 3 at 0 s"));
+        }
+        let swings = self
+            .phase_durations
+            .iter()
+            .zip(&self.foot_names)
+            .map(|(durations, foot)| swings(durations, foot, time_step, intervals))
+            .collect::<Result<Vec<_>>>()?;
+        if swings.len() != self.foot_names.len() {
+            return Err(Error::input("member phase_durations: needs one row for each of foot_names"));
+        }
+        let layout = Layout::new(&Gait { intervals, swings }, time_step);
+        let mut x = vec![0.0; layout.variables];
+        for (i, point) in base.as_chunks::<6>().0.iter().enumerate() {
+            x[layout.base_block(i)..][..6].copy_from_slice(point);
+        }
+        // The first three control points are one variable, and so are the last three.
+        if let Some(i) = (0..points).find(|&i| x[layout.base_block(i)..][..6] != base[6 * i..6 * i + 6]) {
+            let what = format!(
+                "control point {i} differs from its neighbour; the motion must start and end at rest"
+            );
+            return Err(wrong("base_control_points", what));
+        }
+        for foot in 0..self.foot_names.len() {
+            self.fill_foot(&layout, foot, &mut x)?;
+        }
+        let space = match &self.map {
+            None => Space::Direct,
+            Some(grid) => Space::Warped(Box::new(WarpMap::from_grid(grid)?)),
+        };
+        Ok(ExactMotion { layout, space, x })
+    }
+
+    /// The ground as planned on, as the spline it was.
+    ///
+    /// # Errors
+    /// For a grid that is too small.
+    pub fn heightfield(&self) -> Result<Heightfield> {
+        let ground = &self.ground;
+        Heightfield::interpolate(ground.origin, ground.spacing, ground.columns, ground.rows, &ground.height)
+    }
+
+    fn fill_foot(&self, layout: &Layout, foot: usize, x: &mut [f64]) -> Result<()> {
+        let (name, variables) = (&self.foot_names[foot], &layout.feet[foot]);
+        let member = |what: &str, expected: &[usize]| {
+            let member = format!("{name}_{what}");
+            let (shape, values) = self.spline(&member)?;
+            if shape != expected {
+                return Err(wrong(&member, format!("shape {shape:?}, the phases ask for {expected:?}")));
+            }
+            Ok(values)
+        };
+        let footholds = member("footholds", &[variables.stances.len(), 3])?;
+        for (stance, foothold) in variables.stances.iter().zip(footholds.as_chunks::<3>().0) {
+            x[stance.foothold.first()..][..3].copy_from_slice(foothold);
+        }
+        let swings = member("swing_control_points", &[variables.swings.len(), 3, 3])?;
+        for (swing, points) in variables.swings.iter().zip(swings.as_chunks::<9>().0) {
+            x[swing.control_points..][..9].copy_from_slice(points);
+        }
+        let forces = member("force_nodes", &[layout.intervals + 1, 3])?;
+        for (k, force) in forces.as_chunks::<3>().0.iter().enumerate() {
+            match layout.force(foot, k) {
+                Some((_, node)) => x[node.first()..][..3].copy_from_slice(force),
+                None if *force == [0.0; 3] => {}
+                None => {
+                    let what = format!("a force at node {k}, where the foot moves or switches");
+                    return Err(wrong(&format!("{name}_force_nodes"), what));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Shape and values of a member under `spline/`.
+    fn spline(&self, name: &str) -> Result<(&[usize], &[f64])> {
+        let found: Option<&NamedArray> = self.splines.iter().find(|(member, ..)| member == name);
+        let (_, shape, values) = found.ok_or_else(|| {
+            wrong(name, "is missing; without it there are the plan's samples only, no motion between them")
+        })?;
+        if shape.iter().product::<usize>() != values.len() {
+            return Err(wrong(name, format!("{} values for the shape {shape:?}", values.len())));
+        }
+        Ok((shape, values))
+    }
+}
+
+/// The swings of a foot from its phase durations, whose ends lie on samples.
+fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Result<Vec<Swing>> {
+    let refuse = |what: String| Err(Error::input(format!("member phase_durations of {foot}: {what}")));
+    if durations.len().is_multiple_of(2) {
+        return refuse(format!(
+            "{} phases; stance is first and last, so their number is odd",
+            durations.len()
+        ));
+    }
+    let mut edges = vec![0];
+    let mut time = 0.0;
+    for duration in durations {
+        time += duration;
+        let k = (time / time_step).round();
+        if !((time / time_step - k).abs() < 1e-3
+            && k > edges[edges.len() - 1] as f64
+            && k <= intervals as f64)
+        {
+            return refuse(format!(
+                "a switch at {time} s is not on a later sample of {time_step} s within the plan"
+            ));
+        }
+        edges.push(k as usize);
+    }
+    if edges[durations.len()] != intervals {
+        return refuse(format!("they end at {time} s, the base at {} s", intervals as f64 * time_step));
+    }
+    Ok((1..durations.len()).step_by(2).map(|j| Swing { start: edges[j], end: edges[j + 1] }).collect())
+}
+
+fn wrong(member: &str, what: impl std::fmt::Display) -> Error {
+    Error::input(format!("member spline/{member}: {what}"))
+}

@@ -1,0 +1,143 @@
+"""What is compiled from Rust (`validate/src`). World frame: x forward, y left, z up. SI units. E feet.
+
+An argument `t` or `points` may be anything that NumPy takes for an array; results are new arrays. What cannot be used is refused with
+`InputError`, a `ValueError`; `RuntimeError` means that something inside failed.
+"""
+
+from collections.abc import Callable
+from os import PathLike
+from typing import Any, final
+
+import numpy as np
+import numpy.typing as npt
+
+@final
+class BaseMotion:
+    """The base at times of shape (…), in the world frame."""
+
+    @property
+    def position(self) -> npt.NDArray[np.float64]:
+        """(…, 3) centre of mass, m."""
+
+    @property
+    def quaternion_wxyz(self) -> npt.NDArray[np.float64]:
+        """(…, 4) body to world, unit, with the sign of the plan's samples nearby."""
+
+    @property
+    def linear_velocity(self) -> npt.NDArray[np.float64]:
+        """(…, 3) m/s."""
+
+    @property
+    def linear_acceleration(self) -> npt.NDArray[np.float64]:
+        """(…, 3) m/s²."""
+
+    @property
+    def angular_velocity(self) -> npt.NDArray[np.float64]:
+        """(…, 3) rad/s, world."""
+
+    @property
+    def angular_acceleration(self) -> npt.NDArray[np.float64]:
+        """(…, 3) rad/s², world."""
+
+@final
+class FeetMotion:
+    """All feet at times of shape (…), in the world frame, in the order of `Trajectory.foot_names`."""
+
+    @property
+    def position(self) -> npt.NDArray[np.float64]:
+        """(…, E, 3) contact points, m."""
+
+    @property
+    def velocity(self) -> npt.NDArray[np.float64]:
+        """(…, E, 3) m/s."""
+
+    @property
+    def acceleration(self) -> npt.NDArray[np.float64]:
+        """(…, E, 3) m/s²."""
+
+    @property
+    def force(self) -> npt.NDArray[np.float64]:
+        """(…, E, 3) of the ground on the robot, N."""
+
+    @property
+    def contact(self) -> npt.NDArray[np.bool_]:
+        """(…, E) in stance; a foot that lifts off or touches down at this very time counts as standing."""
+
+    @property
+    def normal(self) -> npt.NDArray[np.float64]:
+        """(…, E, 3) unit normal of the terrain under the foot."""
+
+@final
+class Terrain:
+    """The ground as planned on: a C² spline through the heights of the plan; beyond their rectangle it is extended."""
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """x_min, x_max, y_min, y_max, m."""
+
+    def height(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """h, m, (…), at points (…, 2), x and y in m."""
+
+    def gradient(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """∂h/∂x and ∂h/∂y, (…, 2), at points (…, 2)."""
+
+    def normal(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The upward unit normal, (…, 3), at points (…, 2)."""
+
+@final
+class Trajectory:
+    """A plan as the splines that were optimised: exact at any time, not interpolated between samples."""
+
+    @property
+    def duration(self) -> float:
+        """The horizon, s."""
+
+    @property
+    def t(self) -> npt.NDArray[np.float64]:
+        """(N,) times of the plan's own samples, s."""
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """The E feet in order."""
+
+    @property
+    def terrain(self) -> Terrain:
+        """The ground as planned on."""
+
+    @property
+    def solved(self) -> bool:
+        """Every constraint of the nonlinear program holds."""
+
+    @property
+    def passed(self) -> bool:
+        """Every check in the plan holds: each law again, from the samples alone."""
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """The plan's member `meta`: scenario, robot, solver, checks, inputs."""
+
+    def base(self, t: npt.ArrayLike) -> BaseMotion:
+        """The base at times t in s, of any shape (…); a time outside 0…`duration` is refused."""
+
+    def feet(self, t: npt.ArrayLike) -> FeetMotion:
+        """The feet and their forces at times t in s, of any shape (…)."""
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the plan file, `NAME.plan.npz`."""
+
+def load(path: str | PathLike[str]) -> Trajectory:
+    """Read a plan file; one that is damaged or has no splines is refused with file, member and reason."""
+
+def solve(
+    scenario: str | PathLike[str],
+    *,
+    overrides: dict[str, Any] | None = None,
+    progress: Callable[[int, float, float], object] | None = None,
+) -> Trajectory:
+    """Plan the motion of a scenario and check it, as `warpgait solve` does.
+
+    `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
+    `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
+    iteration of the nonlinear program; what it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile;
+    of several solves in one process, one runs at a time. A solve that does not converge is no error: see `solved` and `passed`.
+    """
