@@ -99,13 +99,14 @@ fn splines_that_do_not_fit_together_are_refused() {
     }
     let good = plan("direct");
     type Spoil = fn(&mut Plan);
-    let cases: [(Spoil, &str); 10] = [
+    let cases: [(Spoil, &str); 11] = [
         (|plan| plan.splines.retain(|(name, ..)| name != "LF_footholds"), "spline/LF_footholds: is missing"),
         (|plan| splines(plan, "base_control_points").1 = vec![86, 3], "expected (intervals + 3, 6)"),
         (|plan| splines(plan, "base_control_points").2[1] += 0.1, "start and end at rest"),
         (|plan| splines(plan, "base_knots").2[7] += 0.01, "not uniform"),
         (|plan| splines(plan, "base_knots").2.fill(f64::NAN), "not uniform"),
-        (|plan| splines(plan, "RH_force_nodes").1[0] -= 1, "the phases ask for"),
+        (|plan| splines(plan, "RH_force_nodes").1[0] -= 1, "123 values for the shape [40, 3]"),
+        (|plan| splines(plan, "RH_force_nodes").1 = vec![123, 1], "the phases ask for [41, 3]"),
         (|plan| splines(plan, "RH_force_nodes").2.fill(1.0), "where the foot moves"),
         (|plan| plan.phase_durations[1].truncate(2), "phase_durations of RF: 2 phases"),
         (|plan| plan.phase_durations[1][0] += 0.02, "phase_durations of RF: a switch"),
