@@ -57,7 +57,7 @@ impl Progress {
     }
 
     /// Shows where a stage stands.
-    fn update(&mut self, stage: &str, detail: &str) {
+    pub(super) fn update(&mut self, stage: &str, detail: &str) {
         if self.quiet {
             return;
         }
