@@ -53,7 +53,7 @@
 //! | [`check`] | a plan file alone | every law again, by other code, between the samples too |
 //! | [`report`] | plan, checks | tables and drawings |
 //! | [`pipeline`] | a scenario | all of the above in order |
-//! | [`bench`] | the paper's protocol | its tables and figures, and speed |
+//! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
 //! | [`cli`] | arguments | exit codes |
 //!
 //! # Notation
