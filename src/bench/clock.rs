@@ -76,19 +76,17 @@ mod tests {
         assert_eq!(ticks("17 (a"), None);
     }
 
+    /// The clock is the whole process's, and so other tests count too: it must advance while this one works, that is all.
     #[test]
-    fn counts_work_and_not_sleep() {
+    fn advances_with_work() {
         let mut clock = CpuClock::start();
-        std::thread::sleep(std::time::Duration::from_millis(200));
-        let asleep = clock.lap();
-        if clock.kind() == ClockKind::Cpu {
-            assert!(asleep < 0.1, "{asleep}");
+        let (start, mut total, mut sum) = (Instant::now(), 0.0, 0u64);
+        while total < 0.02 && start.elapsed().as_secs() < 60 {
+            for _ in 0..1_000_000 {
+                sum = std::hint::black_box(sum.wrapping_mul(3).wrapping_add(1));
+            }
+            total += clock.lap();
         }
-        let start = Instant::now();
-        let mut sum = 0u64;
-        while start.elapsed().as_millis() < 300 {
-            sum = std::hint::black_box(sum.wrapping_mul(3).wrapping_add(1));
-        }
-        assert!(clock.lap() > 0.02);
+        assert!(total >= 0.02);
     }
 }
