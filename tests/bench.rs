@@ -25,7 +25,6 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
     let (code, out, err) = warpgait(folder.path(), &arguments);
     assert_eq!(code, 0, "{err}");
     assert!(out.contains("3 (100 %)") && out.contains("results.csv"), "{out}");
-    assert!(err.contains("3 of 3 cases (0 from before)"), "{err}");
     let first = results(folder.path(), "table1");
     let motion = &first["cases"][0]["measured"]["motion"];
     assert_eq!(motion["solved"], true);
@@ -36,9 +35,12 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
 
     let case = folder.path().join("bench/cases/anymal_towr-rippled-easy-000-direct.json");
     std::fs::write(&case, "{").unwrap();
+    let kept = folder.path().join("bench/cases/anymal_towr-rippled-easy-120-direct.json");
+    let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
     let (code, _, err) = warpgait(folder.path(), &arguments);
     assert_eq!(code, 0);
     assert!(err.contains("3 of 3 cases (2 from before)"), "{err}");
+    assert_eq!(std::fs::metadata(&kept).unwrap().modified().unwrap(), written);
     let second = results(folder.path(), "table1");
     // The kept rows are the very same, times included; the one computed again took the same way.
     assert_eq!(second["cases"][1], first["cases"][1]);
