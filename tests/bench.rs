@@ -35,8 +35,11 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
 
     let case = folder.path().join("bench/cases/anymal_towr-rippled-easy-000-direct.json");
     std::fs::write(&case, "{").unwrap();
+    let kept = folder.path().join("bench/cases/anymal_towr-rippled-easy-120-direct.json");
+    let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
     let (code, _, err) = warpgait(folder.path(), &arguments);
     assert_eq!(code, 0, "{err}");
+    assert_eq!(std::fs::metadata(&kept).unwrap().modified().unwrap(), written);
     let second = results(folder.path(), "table1");
     // The kept rows are the very same, times included; the one computed again took the same way.
     assert_eq!(second["cases"][1], first["cases"][1]);

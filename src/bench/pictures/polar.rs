@@ -2,7 +2,6 @@
 
 use super::super::sweep::Row;
 use super::{blend, colour, distinct, motion, solved};
-use crate::report::number;
 use crate::report::svg::{Font, Svg};
 
 /// Of a plot, pixels.
@@ -40,7 +39,7 @@ impl Polar {
             let share = f64::from(i) / 4.0;
             svg.circle(self.centre, RADIUS * share, faint);
             let [x, y] = self.at(7.5, share * self.most);
-            svg.text([x, y + 4.0], &format!("{}{unit}", number(share * self.most)), Font::TICK);
+            svg.text([x, y + 4.0], &format!("{}{unit}", share * self.most), Font::TICK);
         }
         for heading in (0..360).step_by(45) {
             let rim = self.at(heading.into(), self.most);
