@@ -192,12 +192,14 @@ impl Problem {
                 if (0..3).any(|d| stance.foothold.first() + d == v) {
                     return format!("{name} foothold {j} {}", axis(v - stance.foothold.first()));
                 }
-                if let Some((k, f)) = stance.free_forces().find(|(_, f)| (0..3).any(|d| f.first() + d == v)) {
-                    return format!(
-                        "{name} force at {:.3} s {}",
-                        k as f64 * layout.time_step,
-                        axis(v - f.first())
-                    );
+                for (k, force) in stance.free_forces() {
+                    if let Some(&(first, _)) = force.terms.iter().find(|t| (t.0..t.0 + 3).contains(&v)) {
+                        return format!(
+                            "{name} force near {:.3} s {}",
+                            k as f64 * layout.time_step,
+                            axis(v - first)
+                        );
+                    }
                 }
             }
             for (j, swing) in foot.swings.iter().enumerate() {

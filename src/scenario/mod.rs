@@ -56,6 +56,9 @@ pub struct Scenario {
     /// Which form of the laws of motion.
     #[serde(default)]
     pub physics: PhysicsSpec,
+    /// How finely the motion is divided.
+    #[serde(default)]
+    pub discretization: DiscretizationSpec,
     /// How φ is found.
     #[serde(default)]
     pub map: MapSpec,
@@ -352,6 +355,24 @@ pub enum Law {
 pub struct PhysicsSpec {
     /// The law.
     pub law: Law,
+}
+
+/// `[discretization]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiscretizationSpec {
+    /// Distance of the knots of the base's spline, in time steps. More than 1 leaves fewer unknowns for each row of physics.
+    #[schemars(range(min = 1, max = 100))]
+    pub base_knots: usize,
+    /// Distance of the nodes of the forces, in time steps.
+    #[schemars(range(min = 1, max = 100))]
+    pub force_knots: usize,
+}
+
+impl Default for DiscretizationSpec {
+    fn default() -> Self {
+        Self { base_knots: 1, force_knots: 1 }
+    }
 }
 
 /// How the map is found.
