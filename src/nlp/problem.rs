@@ -7,6 +7,7 @@ use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
 use crate::constraints::friction_conformal::FrictionConformal;
 use crate::constraints::goal::Goal;
+use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
@@ -71,7 +72,8 @@ impl Problem {
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
-                Law::Pcdm | Law::NewtonEuler => Box::new(Dynamics::centred(intervals)),
+                Law::Pcdm => Box::new(Dynamics::centred(intervals)),
+                Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
             Box::new(Reach::new(&model)),
             match contact.cone {

@@ -71,9 +71,9 @@ impl Motion {
 
 /// Refuses what cannot be solved before anything is computed.
 pub fn validate(scenario: &Scenario) -> Result<()> {
-    if scenario.physics.law == Law::NewtonEuler {
+    if scenario.physics.law == Law::NewtonEuler && scenario.formulation == Formulation::Warped {
         return Err(Error::input(
-            "physics.law = \"newton-euler\" is not available yet; \"pcdm\" (the default) obeys Newton's and Euler's law between the samples as well",
+            "physics.law = \"newton-euler\" needs the orientation's second derivative in time, and the map is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default), or formulation = \"direct\"",
         ));
     }
     if scenario.gait.optimize_durations {

@@ -129,6 +129,8 @@ pub struct Layout {
     pub base_intervals: usize,
     /// The base at each sample, six components.
     pub base: Vec<LinearNode>,
+    /// Velocity and acceleration of the base at each sample, six components.
+    pub base_rates: Vec<[LinearNode; 2]>,
     /// Distinct control points of the base.
     pub base_blocks: usize,
     /// By foot.
@@ -156,12 +158,16 @@ impl Layout {
             variables: 6 * base_blocks,
             base_intervals,
             base: Vec::new(),
+            base_rates: Vec::new(),
             base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
             foot_nodes: Vec::new(),
         };
         layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
+        layout.base_rates = (0..=intervals)
+            .map(|k| [1, 2].map(|derivative| layout.base_node(k as f64, derivative)))
+            .collect();
         for foot in 0..gait.swings.len() {
             layout.add_foot(gait, foot, force);
         }
