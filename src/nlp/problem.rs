@@ -87,7 +87,7 @@ impl Problem {
             Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
         ];
         if let Some(max_slope) = contact.max_slope {
-            blocks.push(Box::new(FootholdSlope::new(&model, max_slope)));
+            blocks.push(Box::new(FootholdSlope::new(&model, max_slope, contact.edge_margin)));
         }
         let [base, force] = motion.smoothness.map(|weight| COST_SCALE * weight);
         let mut costs: Vec<Box<dyn Cost>> = Vec::new();

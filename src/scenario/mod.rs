@@ -328,11 +328,14 @@ pub struct ContactSpec {
     /// Greatest slope |∇h| of a foothold; default: none.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
+    /// With `max_slope`: how far from steeper ground a foothold must be, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub edge_margin: f64,
 }
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { friction: 0.75, cone: Cone::Exact, max_slope: None }
+        Self { friction: 0.75, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
     }
 }
 
@@ -472,6 +475,9 @@ pub struct SolverSpec {
     pub continuation: Continuation,
     /// Which Hessian; default: exact where there is a cost, limited memory where there is none.
     pub hessian: Option<Hessian>,
+    /// How many steps the limited-memory Hessian remembers.
+    #[schemars(range(min = 1, max = 1000))]
+    pub hessian_memory: usize,
     /// How far to go.
     pub effort: Effort,
 }
@@ -483,6 +489,7 @@ impl Default for SolverSpec {
             tolerance: 1e-4,
             continuation: Continuation::Mode(ContinuationMode::Auto),
             hessian: None,
+            hessian_memory: 6,
             effort: Effort::Smooth,
         }
     }
