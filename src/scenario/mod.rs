@@ -385,16 +385,44 @@ pub enum MapMethod {
     /// The scale-invariant energy ¼(‖J‖²/det^⅔ − 3).
     #[default]
     Mips,
-    /// Algorithm 1.
+    /// As conformal as possible by Algorithm 1; may fold.
     AcapLocalGlobal,
-    /// μ > 0, Gauss–Newton.
+    /// The same with a barrier against folds, by Gauss–Newton.
     AcapNewton,
-    /// Laplace.
+    /// Laplace; may fold.
     Dirichlet,
-    /// As rigid as possible.
+    /// As rigid as possible; may fold.
     Arap,
     /// (x, y, z + h).
     Shear,
+    /// The cheapest that is good enough.
+    Auto,
+}
+
+impl MapMethod {
+    /// As in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            MapMethod::Mips => "mips",
+            MapMethod::AcapLocalGlobal => "acap-local-global",
+            MapMethod::AcapNewton => "acap-newton",
+            MapMethod::Dirichlet => "dirichlet",
+            MapMethod::Arap => "arap",
+            MapMethod::Shear => "shear",
+            MapMethod::Auto => "auto",
+        }
+    }
+}
+
+/// The scale of the scaled rotation that J is compared with, in the `acap` methods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MapScale {
+    /// tr Σ/3, the nearest.
+    #[default]
+    Trace,
+    /// |Σ|^⅓, as in the paper.
+    Determinant,
 }
 
 /// `[map]`.
@@ -403,9 +431,11 @@ pub enum MapMethod {
 pub struct MapSpec {
     /// The method.
     pub method: MapMethod,
-    /// Cells along x, y, z.
+    /// acap-local-global, acap-newton: the scale.
+    pub scale: MapScale,
+    /// Cells along x, y, z; default: 48, 48, 16, and twice as many along x and y where the terrain bends too much for them.
     #[schemars(inner(range(min = 4, max = 512)))]
-    pub cells: [usize; 3],
+    pub cells: Option<[usize; 3]>,
     /// Height of the box, m.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub thickness: f64,
@@ -413,7 +443,14 @@ pub struct MapSpec {
 
 impl Default for MapSpec {
     fn default() -> Self {
-        Self { method: MapMethod::Mips, cells: [48, 48, 16], thickness: 2.5 }
+        Self { method: MapMethod::Mips, scale: MapScale::Trace, cells: None, thickness: 2.5 }
+    }
+}
+
+impl MapSpec {
+    /// The cells to begin with.
+    pub fn cells(&self) -> [usize; 3] {
+        self.cells.unwrap_or([48, 48, 16])
     }
 }
 
