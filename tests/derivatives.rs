@@ -117,6 +117,15 @@ fn other_laws_and_cones_match_differences() {
     }
 }
 
+#[test]
+fn coarse_knots_and_newton_euler_match_differences() {
+    let coarse = "[discretization]\nbase_knots = 3\nforce_knots = 2";
+    for formulation in ["warped", "direct"] {
+        check(problem(TERRAINS[2].1, formulation, coarse), coarse);
+    }
+    check(problem(TERRAINS[2].1, "direct", "[physics]\nlaw = \"newton-euler\""), "newton-euler");
+}
+
 /// The check itself must see a wrong derivative: one entry of the Jacobian off by 1e-3.
 #[test]
 fn the_check_is_not_blind() {

@@ -35,6 +35,8 @@ const HILL_GOALS: [[f64; 2]; GOALS] = [
 ];
 /// Distance of the goals outside the pit from its centre, m.
 const PIT_GOAL: f64 = 2.0;
+/// Knot spacings of base and forces, in time steps.
+const KNOTS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Horizons of `speed`, s.
 const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 
@@ -60,7 +62,7 @@ pub enum Bench {
     Fig9,
     /// Fig. 11: violation by iteration, for one climb.
     Fig11,
-    /// Success against steepness beyond the hard level.
+    /// Success against steepness beyond the hard level, and against coarser knots.
     Frontier,
     /// Maps by method, terrain and level.
     Map,
@@ -193,9 +195,27 @@ impl Protocol<'_> {
         self.levels(&["medium"]).iter().flat_map(one).collect()
     }
 
-    /// Success beyond the hard level.
+    /// Success beyond the hard level, and with fewer unknowns for each row of physics.
     fn frontier(&self) -> Vec<Case> {
         let mut cases = Vec::new();
+        for terrain in self.terrains(&TERRAINS) {
+            for knots in if self.quick() { &KNOTS[..2] } else { &KNOTS[..] } {
+                for way in thinned(ways(terrain), true) {
+                    for formulation in &self.formulations() {
+                        let parameter = Some(("knots", *knots));
+                        cases.push(self.plan(
+                            Work::Plan,
+                            terrain,
+                            "medium",
+                            formulation,
+                            parameter,
+                            10.0,
+                            &way,
+                        ));
+                    }
+                }
+            }
+        }
         for terrain in self.terrains(&TERRAINS) {
             let (name, values) = steeper(terrain);
             let values: Vec<f64> = if self.quick() { vec![values[0], values[4]] } else { values.to_vec() };
@@ -320,7 +340,13 @@ impl Protocol<'_> {
         way: &Way,
     ) -> String {
         let adhesive = if is_steep(terrain) { "\"LF\", \"RF\"" } else { "" };
-        let parameter = parameter.map_or(String::new(), |(key, value)| format!("{key} = {value:?}\n"));
+        let (parameter, knots) = match parameter {
+            Some(("knots", n)) => {
+                (String::new(), format!("[discretization]\nbase_knots = {n}\nforce_knots = {n}\n\n"))
+            }
+            Some((key, value)) => (format!("{key} = {value:?}\n"), String::new()),
+            None => Default::default(),
+        };
         // Cliffs need finer cells than slopes.
         let cells = if terrain == "pit" { "64, 64, 16" } else { "48, 48, 16" };
         let ([x, y], [u, v]) = (way.start, way.goal);
@@ -331,7 +357,7 @@ impl Protocol<'_> {
              [terrain]\nkind = \"{terrain}\"\nlevel = \"{level}\"\n{parameter}\
              extent = [-{RADIUS:?}, {RADIUS:?}, -{RADIUS:?}, {RADIUS:?}]\n\n\
              [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
-             [solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
+             {knots}[solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
              [map]\ncells = [{cells}]\n",
             self.options.robot
         )

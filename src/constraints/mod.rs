@@ -8,6 +8,7 @@ pub mod foothold_slope;
 pub mod friction;
 pub mod friction_conformal;
 pub mod goal;
+pub mod newton_euler;
 pub mod normal_force;
 pub mod reach;
 pub mod stance;

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::heightfield::Heightfield;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
+use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Layout};
 use crate::{Error, Result};
@@ -85,7 +86,14 @@ impl Model {
             underside,
             ground,
             space,
-            layout: Layout::new(&gait, scenario.time_step),
+            layout: Layout::new(
+                &gait,
+                scenario.time_step,
+                KnotSpacing {
+                    base: scenario.discretization.base_knots,
+                    force: scenario.discretization.force_knots,
+                },
+            ),
         })
     }
 

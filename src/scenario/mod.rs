@@ -56,6 +56,9 @@ pub struct Scenario {
     /// Which form of the laws of motion.
     #[serde(default)]
     pub physics: PhysicsSpec,
+    /// How finely the motion is divided.
+    #[serde(default)]
+    pub discretization: DiscretizationSpec,
     /// How φ is found.
     #[serde(default)]
     pub map: MapSpec,
@@ -325,11 +328,14 @@ pub struct ContactSpec {
     /// Greatest slope |∇h| of a foothold; default: none.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
+    /// With `max_slope`: how far from steeper ground a foothold must be, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub edge_margin: f64,
 }
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { friction: 0.75, cone: Cone::Exact, max_slope: None }
+        Self { friction: 0.75, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
     }
 }
 
@@ -352,6 +358,24 @@ pub enum Law {
 pub struct PhysicsSpec {
     /// The law.
     pub law: Law,
+}
+
+/// `[discretization]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiscretizationSpec {
+    /// Distance of the knots of the base's spline, in time steps. More than 1 leaves fewer unknowns for each row of physics.
+    #[schemars(range(min = 1, max = 100))]
+    pub base_knots: usize,
+    /// Distance of the nodes of the forces, in time steps.
+    #[schemars(range(min = 1, max = 100))]
+    pub force_knots: usize,
+}
+
+impl Default for DiscretizationSpec {
+    fn default() -> Self {
+        Self { base_knots: 1, force_knots: 1 }
+    }
 }
 
 /// How the map is found.
@@ -488,6 +512,9 @@ pub struct SolverSpec {
     pub continuation: Continuation,
     /// Which Hessian; default: exact where there is a cost, limited memory where there is none.
     pub hessian: Option<Hessian>,
+    /// How many steps the limited-memory Hessian remembers.
+    #[schemars(range(min = 1, max = 1000))]
+    pub hessian_memory: usize,
     /// How far to go.
     pub effort: Effort,
 }
@@ -499,6 +526,7 @@ impl Default for SolverSpec {
             tolerance: 1e-4,
             continuation: Continuation::Mode(ContinuationMode::Auto),
             hessian: None,
+            hessian_memory: 6,
             effort: Effort::Smooth,
         }
     }

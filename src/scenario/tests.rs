@@ -189,7 +189,18 @@ fn values_can_be_set_from_the_command_line() {
 #[test]
 fn the_schema_names_every_section() {
     let schema = json_schema();
-    for key in ["terrain", "start", "goal", "gait", "motion", "contact", "physics", "map", "solver"] {
+    for key in [
+        "terrain",
+        "start",
+        "goal",
+        "gait",
+        "motion",
+        "contact",
+        "physics",
+        "discretization",
+        "map",
+        "solver",
+    ] {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
     assert_eq!(schema["$defs"]["MotionSpec"]["properties"]["force_limit"]["maximum"], 100.0);

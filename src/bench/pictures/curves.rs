@@ -44,36 +44,47 @@ pub(super) fn histories(rows: &[&Row]) -> String {
     svg.finish()
 }
 
-/// Shares of solved and checked motions against what makes a terrain steeper.
+/// Shares of solved and checked motions against what is varied: steepness on the left, knots on the right, a row a terrain.
 pub(super) fn frontier(groups: &[Group]) -> String {
-    let mut svg = Svg::new(1240.0, 860.0);
-    heading(&mut svg, "Motions found beyond the hard level");
+    let terrains = distinct(groups.iter().map(|group| group.terrain.as_str()));
+    let mut svg = Svg::new(1240.0, 130.0 + 350.0 * terrains.len() as f64);
+    heading(&mut svg, "Motions found beyond the hard level, and with fewer knots");
     let [warped, direct] = ["warped", "direct"].map(|method| style(method, ""));
     let solved = format!("stroke=\"#555\" stroke-width=\"2\" {DASHED}");
     let names =
         [("warped", &*warped), ("direct", &*direct), ("dashed: solved, but for the checks", &*solved)];
     legend(&mut svg, [70.0, 62.0], &names);
-    for (i, terrain) in distinct(groups.iter().map(|group| group.terrain.as_str())).into_iter().enumerate() {
+    for (row, terrain) in terrains.into_iter().enumerate() {
         let here: Vec<&Group> = groups.iter().filter(|group| group.terrain == terrain).collect();
-        let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
-        let name = here[0].parameter.map_or("", |(name, _)| name);
-        let frame = [90.0 + 600.0 * (i % 2) as f64, 110.0 + 380.0 * (i / 2) as f64, 500.0, 280.0];
-        let axes = Axes::new(frame, range(here.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
-        axes.draw(&mut svg, terrain, name, "motions found, %");
-        for method in distinct(here.iter().map(|group| group.method.as_str())) {
-            let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
-                let of_method = here.iter().filter(|group| group.method == method);
-                of_method
-                    .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
-                    .collect()
-            };
-            svg.polyline(curve(|group| group.solved), &style(method, DASHED));
-            let checked = curve(|group| group.passed);
-            svg.polyline(checked.iter().copied(), &style(method, ""));
-            checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+        let varied = distinct(here.iter().filter_map(|group| Some(group.parameter?.0)));
+        for name in varied {
+            let of: Vec<&Group> =
+                here.iter().copied().filter(|group| group.parameter.is_some_and(|p| p.0 == name)).collect();
+            let column = if name == "knots" { 1.0 } else { 0.0 };
+            curve(&mut svg, [90.0 + 600.0 * column, 110.0 + 350.0 * row as f64], terrain, name, &of);
         }
     }
     svg.finish()
+}
+
+fn curve(svg: &mut Svg, [x, y]: [f64; 2], terrain: &str, name: &str, groups: &[&Group]) {
+    let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
+    let frame = [x, y, 500.0, 250.0];
+    let axes = Axes::new(frame, range(groups.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
+    let title = if name == "knots" { format!("{terrain}, medium") } else { terrain.to_string() };
+    axes.draw(svg, &title, name, "motions found, %");
+    for method in distinct(groups.iter().map(|group| group.method.as_str())) {
+        let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
+            let of_method = groups.iter().filter(|group| group.method == method);
+            of_method
+                .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
+                .collect()
+        };
+        svg.polyline(curve(|group| group.solved), &style(method, DASHED));
+        let checked = curve(|group| group.passed);
+        svg.polyline(checked.iter().copied(), &style(method, ""));
+        checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+    }
 }
 
 /// How the cost grows with the length of the motion.
