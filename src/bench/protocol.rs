@@ -46,8 +46,19 @@ pub const TERRAINS: [&str; 4] = ["rippled", "conic", "hilly", "pit"];
 pub const LEVELS: [&str; 3] = ["easy", "medium", "hard"];
 /// Both formulations.
 pub const FORMULATIONS: [&str; 2] = ["warped", "direct"];
-/// How a map can be found.
-pub const METHODS: [&str; 6] = ["mips", "acap-local-global", "acap-newton", "dirichlet", "arap", "shear"];
+/// How a map can be found: a name and keys of `[map]`.
+pub const METHODS: [(&str, &str); 8] = [
+    ("shear", "method = \"shear\""),
+    ("dirichlet", "method = \"dirichlet\""),
+    ("arap", "method = \"arap\""),
+    ("acap-local-global, as printed", "method = \"acap-local-global\"\nscale = \"determinant\""),
+    ("acap-local-global", "method = \"acap-local-global\""),
+    ("acap-newton", "method = \"acap-newton\""),
+    ("mips", "method = \"mips\""),
+    ("auto", "method = \"auto\""),
+];
+/// Of a quick run, which is about what there is and not how good it is.
+const FEW_CELLS: &str = "cells = [24, 24, 8]\n";
 
 /// A table or figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +67,8 @@ pub enum Bench {
     Table1,
     /// Fig. 4: the conformal error of the map on the ground.
     Fig4,
+    /// Fig. 5: how the map's energy falls, by the paper's methods and ours.
+    Fig5,
     /// Fig. 8: violation by iteration, for all headings.
     Fig8,
     /// Fig. 9: time to solve, for all headings.
@@ -72,9 +85,10 @@ pub enum Bench {
 
 impl Bench {
     /// All of them.
-    pub const ALL: [Bench; 8] = [
+    pub const ALL: [Bench; 9] = [
         Bench::Table1,
         Bench::Fig4,
+        Bench::Fig5,
         Bench::Fig8,
         Bench::Fig9,
         Bench::Fig11,
@@ -88,6 +102,7 @@ impl Bench {
         match self {
             Bench::Table1 => "table1",
             Bench::Fig4 => "fig4",
+            Bench::Fig5 => "fig5",
             Bench::Fig8 => "fig8",
             Bench::Fig9 => "fig9",
             Bench::Fig11 => "fig11",
@@ -106,6 +121,7 @@ impl Bench {
             Bench::Fig11 => protocol.climb(),
             Bench::Fig4 => protocol.ground_errors(),
             Bench::Frontier => protocol.frontier(),
+            Bench::Fig5 => protocol.energies(),
             Bench::Map => protocol.maps(),
             Bench::Speed => protocol.speed(),
         }
@@ -264,11 +280,19 @@ impl Protocol<'_> {
     }
 
     fn maps(&self) -> Vec<Case> {
-        let methods = if self.quick() { &METHODS[..1] } else { &METHODS[..] };
+        self.maps_by(&METHODS, &LEVELS)
+    }
+
+    /// Fig. 5: Algorithm 1, Gauss–Newton, and the default.
+    fn energies(&self) -> Vec<Case> {
+        self.maps_by(&METHODS[4..7], &["medium"])
+    }
+
+    fn maps_by(&self, methods: &[(&str, &str)], levels: &[&'static str]) -> Vec<Case> {
         let mut cases = Vec::new();
-        for level in &self.levels(&LEVELS) {
+        for level in &self.levels(levels) {
             for terrain in self.terrains(&TERRAINS) {
-                cases.extend(methods.iter().map(|method| self.map(terrain, level, method)));
+                cases.extend(methods.iter().map(|&method| self.map(terrain, level, method)));
             }
         }
         cases
@@ -278,16 +302,19 @@ impl Protocol<'_> {
         let default: &[&'static str] =
             if self.options.terrains.is_empty() { &["rippled"] } else { &TERRAINS };
         let levels = self.levels(&["medium"]);
-        let one =
-            |level: &String| self.terrains(default).map(|t| self.map(t, level, "mips")).collect::<Vec<_>>();
+        let one = |level: &String| {
+            self.terrains(default).map(|t| self.map(t, level, METHODS[6])).collect::<Vec<_>>()
+        };
         levels.iter().flat_map(one).collect()
     }
 
-    fn map(&self, terrain: &str, level: &str, method: &str) -> Case {
-        let name = format!("map-{terrain}-{level}-{method}");
+    fn map(&self, terrain: &str, level: &str, (method, keys): (&str, &str)) -> Case {
+        let quick = if self.quick() { "-quick" } else { "" };
+        let name = format!("map-{terrain}-{level}-{}{quick}", method.replace(", ", "-").replace(' ', "-"));
         let way = &ways(terrain)[0];
         let scenario = self.scenario(&name, terrain, level, "warped", None, 10.0, way)
-            + &format!("method = \"{method}\"\n");
+            + &format!("{keys}\n")
+            + if self.quick() { FEW_CELLS } else { cells(terrain) };
         Case {
             name,
             work: Work::Map,
@@ -314,7 +341,8 @@ impl Protocol<'_> {
         let varied = parameter.map_or(String::new(), |(key, value)| format!("-{key}-{value}"));
         let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.options.robot, way.label);
         let terrain_parameter = parameter.filter(|_| work == Work::Plan);
-        let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way);
+        let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way)
+            + cells(terrain);
         Case {
             name,
             work,
@@ -347,8 +375,6 @@ impl Protocol<'_> {
             Some((key, value)) => (format!("{key} = {value:?}\n"), String::new()),
             None => Default::default(),
         };
-        // Cliffs need finer cells than slopes.
-        let cells = if terrain == "pit" { "64, 64, 16" } else { "48, 48, 16" };
         let ([x, y], [u, v]) = (way.start, way.goal);
         format!(
             "# {name}, written by warpgait bench\n\
@@ -358,10 +384,15 @@ impl Protocol<'_> {
              extent = [-{RADIUS:?}, {RADIUS:?}, -{RADIUS:?}, {RADIUS:?}]\n\n\
              [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
              {knots}[solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
-             [map]\ncells = [{cells}]\n",
+             [map]\n",
             self.options.robot
         )
     }
+}
+
+/// Cliffs need finer cells than slopes.
+fn cells(terrain: &str) -> &'static str {
+    if terrain == "pit" { "cells = [64, 64, 16]\n" } else { "" }
 }
 
 /// Where the front feet may pull, as with the paper's suckers.

@@ -6,11 +6,16 @@
 use std::ops::ControlFlow;
 
 use super::barrier::{Barrier, Curvature};
+use super::lanes::Lanes;
 use super::lbfgs::{Limits, Objective, Outcome, dot};
 use super::problem::Problem;
 
 /// Conjugate gradients by iteration, at most.
 const MAX_INNER: usize = 40;
+/// A step that had to be cut asks for damping: the matrix does not see rotations, and long ones fold space. Least and greatest, and
+/// by how much it changes.
+const DAMPING: [f64; 2] = [0.03, 10.0];
+const DAMPING_FACTOR: f64 = 4.0;
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 const MAX_BACKTRACKS: usize = 30;
 
@@ -29,8 +34,9 @@ pub(super) fn gauss_newton(
     }
     let mut trial = u.clone();
     let mut trial_gradient = gradient.clone();
+    let mut damping = 0.0;
     loop {
-        let step = step(problem, u, &gradient);
+        let step = step(problem, u, &gradient, damping);
         let decrement = dot(&step, &gradient);
         (outcome.value, outcome.decrement) = (value, decrement);
         if progress(outcome.iterations, value, decrement).is_break() {
@@ -60,6 +66,11 @@ pub(super) fn gauss_newton(
             scale *= 0.5;
         }
         let Some(next) = accepted else { return outcome };
+        damping = match scale < 1.0 {
+            true => (DAMPING_FACTOR * damping).clamp(DAMPING[0], DAMPING[1]),
+            false if damping > DAMPING[0] => damping / DAMPING_FACTOR,
+            false => 0.0,
+        };
         std::mem::swap(u, &mut trial);
         std::mem::swap(&mut gradient, &mut trial_gradient);
         value = next;
@@ -67,8 +78,15 @@ pub(super) fn gauss_newton(
     }
 }
 
-/// H⁻¹ g to a residual that falls with the gradient, by preconditioned conjugate gradients.
-fn step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64]) -> Vec<f64> {
+/// (H + damping K)⁻¹ g, K the stiffness of ½‖∇u‖², to a residual that falls with the gradient, by preconditioned conjugate gradients.
+fn step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
+    let times = |curvature: &Curvature, change: &[Lanes; 9]| {
+        let mut out = curvature.times(change);
+        for (o, c) in out.iter_mut().zip(change) {
+            *o += damping * *c;
+        }
+        out
+    };
     let linearized = problem.linearized(u, |density, jacobian| density.curvature(jacobian));
     let mut step = vec![0.0; gradient.len()];
     let mut rest = gradient.to_vec();
@@ -79,7 +97,7 @@ fn step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64]) -> Vec<
     let first = dot(&rest, &conditioned);
     let mut square = first;
     for _ in 0..MAX_INNER {
-        problem.curved(&linearized, Curvature::times, &mut direction, &mut product);
+        problem.curved(&linearized, times, &mut direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature <= 0.0 {
             break;

@@ -300,3 +300,103 @@ fn along(u: &mut [f64], shape: [usize; 3], axis: usize, change: impl Fn(&mut [f6
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::barrier::{Barrier, Curvature};
+    use super::super::density::Mips;
+    use super::super::distance::Distance;
+    use super::*;
+    use crate::scenario::{MapScale, MapSpec};
+
+    fn field() -> Heightfield {
+        Heightfield::from_function([-1.0, 1.0, -1.0, 1.5], 0.05, |x, y| Ok(0.2 * (2.0 * x + y).sin()))
+            .unwrap()
+    }
+
+    fn map(field: &Heightfield) -> WarpMap {
+        let spec = MapSpec { cells: Some([5, 4, 4]), thickness: 1.5, ..MapSpec::default() };
+        WarpMap::shear(field, &spec).unwrap()
+    }
+
+    /// Coefficients a little away from the map's, with what is fixed where it was.
+    fn moved(problem: &Problem<impl Density>, map: &WarpMap) -> Vec<f64> {
+        let mut u = problem.coefficients(map);
+        let mut change: Vec<f64> = (0..u.len()).map(|i| 0.02 * (1.9 * i as f64).sin()).collect();
+        problem.hold_fixed(&mut change);
+        u.iter_mut().zip(&change).for_each(|(u, c)| *u += c);
+        u
+    }
+
+    fn gradient_matches(density: impl Density) {
+        let field = field();
+        let map = map(&field);
+        let mut problem = Problem::new(&field, density, &map, Rule::Lobatto).unwrap();
+        let mut u = moved(&problem, &map);
+        let mut gradient = vec![0.0; u.len()];
+        let mut unused = gradient.clone();
+        problem.evaluate(&mut u, &mut gradient);
+        for at in (0..u.len()).filter(|at| gradient[*at] != 0.0).step_by(5) {
+            let mut at_step = |step: f64| {
+                let mut moved = u.clone();
+                moved[at] += step;
+                problem.evaluate(&mut moved, &mut unused)
+            };
+            let slope = (at_step(1e-5) - at_step(-1e-5)) / 2e-5;
+            assert!(
+                (slope - gradient[at]).abs() < 2e-6 * (1.0 + slope.abs()),
+                "{at}: {slope} {}",
+                gradient[at]
+            );
+        }
+    }
+
+    #[test]
+    fn gradients_through_the_bottom_match_central_differences() {
+        gradient_matches(Mips);
+        gradient_matches(Distance::Rotation);
+        gradient_matches(Barrier { scale: MapScale::Trace });
+        gradient_matches(Barrier { scale: MapScale::Determinant });
+    }
+
+    #[test]
+    fn the_gauss_newton_matrix_is_symmetric_and_positive() {
+        let field = field();
+        let map = map(&field);
+        let problem = Problem::new(&field, Barrier { scale: MapScale::Trace }, &map, Rule::Lobatto).unwrap();
+        let mut u = moved(&problem, &map);
+        problem.seat(&mut u);
+        let linearized = problem.linearized(&u, |density, jacobian| density.curvature(jacobian));
+        let direction = |k: f64| {
+            let mut v: Vec<f64> = (0..u.len()).map(|i| (k * i as f64).sin()).collect();
+            problem.hold_fixed(&mut v);
+            v
+        };
+        let times = |v: &[f64]| {
+            let (mut v, mut out) = (v.to_vec(), vec![0.0; v.len()]);
+            problem.curved(&linearized, Curvature::times, &mut v, &mut out);
+            out
+        };
+        let (a, b) = (direction(0.7), direction(1.3));
+        let (ab, ba) = (dot(&a, &times(&b)), dot(&b, &times(&a)));
+        assert!((ab - ba).abs() < 1e-9 * (ab.abs() + dot(&a, &times(&a))), "{ab} {ba}");
+        assert!(dot(&a, &times(&a)) > 0.0 && dot(&b, &times(&b)) > 0.0);
+    }
+
+    #[test]
+    fn a_round_of_algorithm_one_solves_its_quadratic_problem() {
+        let field = field();
+        let map = map(&field);
+        // The target of this energy is always 1, so that one round is all there is to do above the frozen ground.
+        let mut problem = Problem::new(&field, Distance::Identity, &map, Rule::Lobatto).unwrap();
+        let mut u = moved(&problem, &map);
+        let ground = problem.ground(&u).face;
+        let mut scratch = [vec![0.0; u.len()], vec![0.0; u.len()]];
+        let (before, _) = problem.alternate(&mut u, &mut scratch);
+        assert_eq!(problem.face(&u, 2), ground);
+        let mut gradient = vec![0.0; u.len()];
+        let after = problem.assembly.energy(problem.density, &u, &mut gradient);
+        problem.hold_fixed(&mut gradient);
+        assert!(after < before && gradient.iter().all(|g| g.abs() < 1e-9), "{before} {after}");
+    }
+}

@@ -44,6 +44,65 @@ pub(super) fn histories(rows: &[&Row]) -> String {
     svg.finish()
 }
 
+/// Fig. 5: how far the energy is above its last value on each grid, by iteration, the grids one after another.
+pub(super) fn energies(rows: &[&Row]) -> String {
+    const COLOURS: [&str; 4] = ["#c8352c", "#e08214", "#2166ac", "#1b7837"];
+    let mut svg = Svg::new(1240.0, 860.0);
+    heading(
+        &mut svg,
+        "How the map's energy falls: (E − last)/last, coarse grids first, circles where a grid begins",
+    );
+    let methods = distinct(rows.iter().map(|row| row.case.method.as_str()));
+    let style = |method: &str| {
+        let place = methods.iter().position(|m| *m == method).unwrap_or(0);
+        COLOURS[place % COLOURS.len()]
+    };
+    let line = |method: &str| format!("stroke=\"{}\" stroke-width=\"2\"", style(method));
+    let styles: Vec<String> = methods.iter().map(|method| line(method)).collect();
+    let names: Vec<(&str, &str)> = methods.iter().copied().zip(styles.iter().map(String::as_str)).collect();
+    legend(&mut svg, [70.0, 62.0], &names);
+    for (i, terrain) in distinct(rows.iter().map(|row| row.case.terrain.as_str())).into_iter().enumerate() {
+        let frame = [90.0 + 600.0 * (i % 2) as f64, 110.0 + 380.0 * (i / 2) as f64, 500.0, 280.0];
+        let curves: Vec<(&str, Vec<Vec<f64>>)> = rows
+            .iter()
+            .filter(|row| row.case.terrain == terrain)
+            .filter_map(|row| Some((row.case.method.as_str(), excesses(row)?)))
+            .collect();
+        let all: Vec<f64> =
+            curves.iter().flat_map(|(_, grids)| grids.concat()).filter(|v| *v > 0.0).collect();
+        let longest = curves.iter().map(|(_, grids)| grids.concat().len()).max().unwrap_or(2).max(2);
+        let axes = Axes::logarithmic(frame, [0.0, (longest - 1) as f64], &all);
+        axes.draw(&mut svg, terrain, "iteration", "energy above its last value");
+        let floor = 10f64.powf(axes.y[0]);
+        svg.clipped(frame, |svg| {
+            for (method, grids) in &curves {
+                let mut from = 0;
+                for grid in grids {
+                    let points: Vec<[f64; 2]> = grid
+                        .iter()
+                        .enumerate()
+                        .map(|(k, v)| axes.at((from + k) as f64, v.max(floor)))
+                        .collect();
+                    from += grid.len();
+                    svg.circle(points[0], 3.5, &format!("fill=\"{}\"", style(method)));
+                    svg.polyline(points, &line(method));
+                }
+            }
+        });
+    }
+    svg.finish()
+}
+
+/// By run of the optimizer, the energies less the last of it, relative to that; none without a map or an optimizer.
+fn excesses(row: &Row) -> Option<Vec<Vec<f64>>> {
+    let history = &row.outcome.as_ref().ok()?.map.as_ref()?.report.history;
+    let one = |energy: &Vec<f64>| {
+        let last = *energy.last()?;
+        Some(energy.iter().map(|e| (e - last) / last.abs().max(f64::MIN_POSITIVE)).collect())
+    };
+    Some(history.iter().filter_map(|run| one(&run.energy)).collect())
+}
+
 /// Shares of solved and checked motions against what is varied: steepness on the left, knots on the right, a row a terrain.
 pub(super) fn frontier(groups: &[Group]) -> String {
     let terrains = distinct(groups.iter().map(|group| group.terrain.as_str()));
