@@ -49,24 +49,30 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
 }
 
 #[test]
-fn a_case_that_comes_to_nothing_is_a_row_with_its_reason() {
+fn every_method_of_the_map_is_a_row_with_what_it_is_like() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["bench", "map", "--level", "easy", "--terrain", "conic", "--json"];
+    let arguments = ["bench", "map", "--quick", "--terrain", "conic", "--json"];
     let (code, out, _) = warpgait(folder.path(), &arguments);
     assert_eq!(code, 0);
     let printed: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(printed["bench"], "map");
     let results = results(folder.path(), "map");
     let cases = results["cases"].as_array().unwrap();
-    assert_eq!(cases.len(), 6);
-    let shear = cases.iter().find(|case| case["method"] == "shear").unwrap();
-    assert!(shear["measured"]["map"]["report"]["misfit_max"].is_number(), "{shear}");
-    for case in cases.iter().filter(|case| case["measured"].is_null()) {
-        let verdict = case["verdict"].as_str().unwrap();
-        assert!(verdict.contains("no result (exit status: 2): error:"), "{verdict}");
+    assert_eq!(cases.len(), 8);
+    for case in cases {
+        let report = &case["measured"]["map"]["report"];
+        assert!(report["misfit_max"].as_f64().unwrap() < 5e-3, "{case}");
+        let folded = report["inverted_points"].as_u64().unwrap() > 0;
+        assert_eq!(case["verdict"].as_str().unwrap().contains("FOLDED"), folded, "{case}");
+        assert_eq!(case["good"], !folded, "{case}");
+        let open = case["method"] == "auto";
+        assert!(
+            !open || (report["method"] == "mips" && report["rejected"][0]["method"] == "shear"),
+            "{case}"
+        );
     }
     let csv = std::fs::read_to_string(folder.path().join("bench/map/results.csv")).unwrap();
-    assert_eq!(csv.lines().count(), 7);
+    assert_eq!(csv.lines().count(), 9);
 }
 
 #[test]
