@@ -83,6 +83,7 @@ pub mod costs;
 pub mod error;
 pub mod heightfield;
 pub mod ipopt;
+pub mod leg;
 pub mod nlp;
 pub mod pipeline;
 pub mod plan;
