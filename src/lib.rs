@@ -87,6 +87,7 @@ pub mod leg;
 pub mod nlp;
 pub mod pipeline;
 pub mod plan;
+pub mod replay;
 pub mod report;
 pub mod robot;
 pub mod scenario;
