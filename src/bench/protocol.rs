@@ -44,6 +44,8 @@ const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 pub const TERRAINS: [&str; 4] = ["rippled", "conic", "hilly", "pit"];
 /// Their levels.
 pub const LEVELS: [&str; 3] = ["easy", "medium", "hard"];
+/// Robots with a full model.
+pub const FULL_MODELS: [&str; 2] = ["anymal_b", "anymal_c"];
 /// Both formulations.
 pub const FORMULATIONS: [&str; 2] = ["warped", "direct"];
 /// How a map can be found: a name and keys of `[map]`.
@@ -81,11 +83,13 @@ pub enum Bench {
     Map,
     /// Cost against the length of the motion.
     Speed,
+    /// The plans of Table I on the full robots.
+    Track,
 }
 
 impl Bench {
     /// All of them.
-    pub const ALL: [Bench; 9] = [
+    pub const ALL: [Bench; 10] = [
         Bench::Table1,
         Bench::Fig4,
         Bench::Fig5,
@@ -95,6 +99,7 @@ impl Bench {
         Bench::Frontier,
         Bench::Map,
         Bench::Speed,
+        Bench::Track,
     ];
 
     /// As on the command line.
@@ -109,21 +114,35 @@ impl Bench {
             Bench::Frontier => "frontier",
             Bench::Map => "map",
             Bench::Speed => "speed",
+            Bench::Track => "track",
         }
     }
 
     /// The cases, in the order in which they are run.
     pub fn cases(self, options: &Options) -> Vec<Case> {
-        let protocol = Protocol { options };
+        if self == Bench::Track {
+            let robots = FULL_MODELS
+                .iter()
+                .filter(|&&name| options.robot.as_deref().is_none_or(|robot| robot == name));
+            let of = |robot: &&str| {
+                let protocol = Protocol { options, robot: robot };
+                protocol.table(Work::Track, &TERRAINS, protocol.levels(&LEVELS[..2]))
+            };
+            return robots.flat_map(of).collect();
+        }
+        let protocol = Protocol { options, robot: options.robot.as_deref().unwrap_or("anymal_towr") };
         match self {
-            Bench::Table1 => protocol.table(&TERRAINS, protocol.levels(&LEVELS)),
-            Bench::Fig8 | Bench::Fig9 => protocol.table(&["rippled", "conic"], protocol.levels(&["medium"])),
+            Bench::Table1 => protocol.table(Work::Plan, &TERRAINS, protocol.levels(&LEVELS)),
+            Bench::Fig8 | Bench::Fig9 => {
+                protocol.table(Work::Plan, &["rippled", "conic"], protocol.levels(&["medium"]))
+            }
             Bench::Fig11 => protocol.climb(),
             Bench::Fig4 => protocol.ground_errors(),
             Bench::Frontier => protocol.frontier(),
             Bench::Fig5 => protocol.energies(),
             Bench::Map => protocol.maps(),
             Bench::Speed => protocol.speed(),
+            Bench::Track => unreachable!("handled above"),
         }
     }
 }
@@ -135,6 +154,8 @@ pub struct Case {
     pub name: String,
     /// What is computed.
     pub work: Work,
+    /// Name of the robot.
+    pub robot: String,
     /// Kind of terrain.
     pub terrain: String,
     /// Level of the terrain, or the one that it departs from.
@@ -151,6 +172,7 @@ pub struct Case {
 
 struct Protocol<'a> {
     options: &'a Options,
+    robot: &'a str,
 }
 
 /// Where a motion starts and ends.
@@ -187,13 +209,13 @@ impl Protocol<'_> {
     }
 
     /// Table I.
-    fn table(&self, terrains: &[&'static str], levels: Vec<String>) -> Vec<Case> {
+    fn table(&self, work: Work, terrains: &[&'static str], levels: Vec<String>) -> Vec<Case> {
         let mut cases = Vec::new();
         for level in &levels {
             for terrain in self.terrains(terrains) {
                 for way in thinned(ways(terrain), self.quick()) {
                     for formulation in &self.formulations() {
-                        cases.push(self.plan(Work::Plan, terrain, level, formulation, None, 10.0, &way));
+                        cases.push(self.plan(work, terrain, level, formulation, None, 10.0, &way));
                     }
                 }
             }
@@ -318,6 +340,7 @@ impl Protocol<'_> {
         Case {
             name,
             work: Work::Map,
+            robot: self.robot.into(),
             terrain: terrain.into(),
             level: level.into(),
             method: method.into(),
@@ -339,13 +362,14 @@ impl Protocol<'_> {
         way: &Way,
     ) -> Case {
         let varied = parameter.map_or(String::new(), |(key, value)| format!("-{key}-{value}"));
-        let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.options.robot, way.label);
+        let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.robot, way.label);
         let terrain_parameter = parameter.filter(|_| work == Work::Plan);
         let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way)
             + cells(terrain);
         Case {
             name,
             work,
+            robot: self.robot.into(),
             terrain: terrain.into(),
             level: level.into(),
             method: formulation.into(),
@@ -385,7 +409,7 @@ impl Protocol<'_> {
              [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
              {knots}[solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
              [map]\n",
-            self.options.robot
+            self.robot
         )
     }
 }

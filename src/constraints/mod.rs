@@ -8,6 +8,8 @@ pub mod foothold_slope;
 pub mod friction;
 pub mod friction_conformal;
 pub mod goal;
+pub mod joint_speed;
+pub mod joint_torque;
 pub mod newton_euler;
 pub mod normal_force;
 pub mod reach;

@@ -7,6 +7,8 @@ use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
 use crate::constraints::friction_conformal::FrictionConformal;
 use crate::constraints::goal::Goal;
+use crate::constraints::joint_speed::JointSpeed;
+use crate::constraints::joint_torque::JointTorque;
 use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
@@ -88,6 +90,10 @@ impl Problem {
         ];
         if let Some(max_slope) = contact.max_slope {
             blocks.push(Box::new(FootholdSlope::new(&model, max_slope, contact.edge_margin)));
+        }
+        if model.legs.iter().any(Option::is_some) {
+            blocks.push(Box::new(JointSpeed::new(&model)));
+            blocks.push(Box::new(JointTorque::new(&model)));
         }
         let [base, force] = motion.smoothness.map(|weight| COST_SCALE * weight);
         let mut costs: Vec<Box<dyn Cost>> = Vec::new();
