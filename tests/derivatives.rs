@@ -121,6 +121,15 @@ fn other_laws_and_cones_match_differences() {
     }
 }
 
+#[test]
+fn coarse_knots_and_newton_euler_match_differences() {
+    let coarse = "[discretization]\nbase_knots = 3\nforce_knots = 2";
+    for formulation in ["warped", "direct"] {
+        check(problem(TERRAINS[2].1, formulation, coarse), coarse);
+    }
+    check(problem(TERRAINS[2].1, "direct", "[physics]\nlaw = \"newton-euler\""), "newton-euler");
+}
+
 /// Of a robot with known legs: joint speeds, torques and clearance of the knees besides.
 #[test]
 fn blocks_of_known_legs_match_differences() {

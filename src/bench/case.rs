@@ -171,7 +171,11 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
         (Work::Plan | Work::Track | Work::Speed, Formulation::Direct) => None,
         // A map that is to be measured is built, whatever the cache holds.
         (Work::Map, _) => Some(build_map(&ground.field, &asked.map, false)?),
-        _ => Some(build_map(&ground.field, &asked.map, true)?),
+        _ => {
+            let built = build_map(&ground.field, &asked.map, true)?;
+            built.1.ensure_injective()?;
+            Some(built)
+        }
     };
     let map_seconds = start.elapsed().as_secs_f64();
     cpu.map = clock.lap();
@@ -320,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_flat_map_has_no_error() {
-        let spec = scenario::MapSpec { cells: [8, 8, 4], ..Default::default() };
+        let spec = scenario::MapSpec { cells: Some([8, 8, 4]), ..Default::default() };
         let map = WarpMap::flat([-1.0, 1.0, -1.0, 1.0], &spec).unwrap();
         let errors = ground_errors(&map);
         assert_eq!(errors.len(), GROUND_POINTS * GROUND_POINTS);

@@ -53,8 +53,16 @@ pub struct Group {
     pub violation_max: Option<f64>,
     /// Mean conformal error of the map on the ground, %.
     pub conformal_error: Option<f64>,
+    /// Greatest conformal error of the map on the ground, %.
+    pub conformal_error_max: Option<f64>,
     /// Greatest distance of the map's bottom from the terrain, mm.
     pub misfit: Option<f64>,
+    /// Points where the map is folded.
+    pub inversions: Option<f64>,
+    /// The map's energy at the end, m³; energies of different methods cannot be compared.
+    pub energy: Option<f64>,
+    /// The method that made the map, where the case leaves it open.
+    pub taken: Option<&'static str>,
     /// Replays that pass, are marginal, and fail.
     pub replayed: [usize; 3],
     /// The first metric that decides against a replay, with the number of replays that it decides, the most frequent first.
@@ -102,7 +110,15 @@ impl Group {
             conformal_error: greatest(
                 &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.mean).collect::<Vec<_>>(),
             ),
+            conformal_error_max: greatest(
+                &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.max).collect::<Vec<_>>(),
+            ),
             misfit: greatest(&maps().map(|(_, map)| 1e3 * map.report.misfit_max).collect::<Vec<_>>()),
+            inversions: greatest(
+                &maps().map(|(_, map)| map.report.inverted_points as f64).collect::<Vec<_>>(),
+            ),
+            energy: greatest(&maps().map(|(_, map)| map.report.energy).collect::<Vec<_>>()),
+            taken: maps().map(|(_, map)| map.report.method.name()).next(),
             replayed: [Verdict::Pass, Verdict::Marginal, Verdict::Fail]
                 .map(|verdict| tracks.iter().filter(|track| track.verdict == verdict).count()),
             objections: tracking::objections(&tracks),
@@ -302,12 +318,28 @@ fn evaluations(rows: &[Row]) -> Vec<String> {
 }
 
 fn map_table(groups: &[Group]) -> Vec<String> {
-    let mut table = Table::new(&["terrain", "level", "method", ">CPU s", ">conformal error %", ">misfit mm"]);
+    let mut table = Table::new(&[
+        "terrain",
+        "level",
+        "method",
+        ">CPU s",
+        ">conformal error %",
+        ">most",
+        ">misfit mm",
+        ">inversions",
+        ">energy m³",
+    ]);
     for group in groups {
-        let figures = [group.cpu_map, group.conformal_error, group.misfit].map(shown);
-        table.row(
-            [group.terrain.clone(), group.level.clone(), group.method.clone()].into_iter().chain(figures),
-        );
+        let method = match group.taken {
+            Some(taken) if group.method == "auto" => format!("auto: {taken}"),
+            _ => group.method.clone(),
+        };
+        let [cpu, mean, most, misfit, energy] =
+            [group.cpu_map, group.conformal_error, group.conformal_error_max, group.misfit, group.energy]
+                .map(shown);
+        let inversions = plain(group.inversions);
+        let figures = [cpu, mean, most, misfit, inversions, energy];
+        table.row([group.terrain.clone(), group.level.clone(), method].into_iter().chain(figures));
     }
     table.lines(|_, _, text| text)
 }
@@ -365,8 +397,10 @@ fn machine() -> String {
 }
 
 const COLUMNS: &str = "case,robot,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
-    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,misfit_mm,\
-    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,replay,replay_decided_by,replay_s,verdict";
+    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,\
+    conformal_error_most_percent,misfit_mm,inversions,energy_m3,\
+    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,\
+    replay,replay_decided_by,replay_s,verdict";
 
 /// `results.csv`: one row a case; what does not apply stays empty.
 pub(super) fn csv(rows: &[Row]) -> String {
@@ -406,7 +440,10 @@ fn csv_row(row: &Row) -> Vec<String> {
         cell(map.map(|m| m.cached)),
         cell(map.map(|m| m.report.seconds)),
         cell(map.map(|m| 100.0 * m.report.conformal_ground.mean)),
+        cell(map.map(|m| 100.0 * m.report.conformal_ground.max)),
         cell(map.map(|m| 1e3 * m.report.misfit_max)),
+        cell(map.map(|m| m.report.inverted_points)),
+        cell(map.map(|m| m.report.energy)),
         cell(evaluation.map(|e| e.constraints)),
         cell(evaluation.map(|e| e.jacobian)),
         cell(evaluation.map(|e| e.hessian)),

@@ -36,8 +36,11 @@ impl Smoothness {
         for stance in layout.feet.iter().flat_map(|f| &f.stances) {
             for pair in stance.forces.windows(2) {
                 let mut node = LinearNode::default();
-                node.terms.extend(pair[0].iter().map(|f| (f.first(), -rate)));
-                node.terms.extend(pair[1].iter().map(|f| (f.first(), rate)));
+                for (end, sign) in pair.iter().zip([-rate, rate]) {
+                    for &(variable, weight) in end.iter().flat_map(|f| &f.terms) {
+                        node.push(variable, sign * weight);
+                    }
+                }
                 terms.push((node, 3, 2.0 * weight * layout.time_step));
             }
         }

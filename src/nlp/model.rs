@@ -8,6 +8,7 @@ use crate::heightfield::Heightfield;
 use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
+use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Layout};
 use crate::{Error, Result};
@@ -92,7 +93,14 @@ impl Model {
             underside,
             ground,
             space,
-            layout: Layout::new(&gait, scenario.time_step),
+            layout: Layout::new(
+                &gait,
+                scenario.time_step,
+                KnotSpacing {
+                    base: scenario.discretization.base_knots,
+                    force: scenario.discretization.force_knots,
+                },
+            ),
         })
     }
 

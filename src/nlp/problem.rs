@@ -10,6 +10,7 @@ use crate::constraints::goal::Goal;
 use crate::constraints::joint_speed::JointSpeed;
 use crate::constraints::joint_torque::JointTorque;
 use crate::constraints::knee_clearance::KneeClearance;
+use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
@@ -74,7 +75,8 @@ impl Problem {
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
-                Law::Pcdm | Law::NewtonEuler => Box::new(Dynamics::centred(intervals)),
+                Law::Pcdm => Box::new(Dynamics::centred(intervals)),
+                Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
             Box::new(Reach::new(&model)),
             match contact.cone {
@@ -88,7 +90,7 @@ impl Problem {
             Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
         ];
         if let Some(max_slope) = contact.max_slope {
-            blocks.push(Box::new(FootholdSlope::new(&model, max_slope)));
+            blocks.push(Box::new(FootholdSlope::new(&model, max_slope, contact.edge_margin)));
         }
         if model.legs.iter().any(Option::is_some) {
             blocks.push(Box::new(JointSpeed::new(&model)));
@@ -200,12 +202,14 @@ impl Problem {
                 if (0..3).any(|d| stance.foothold.first() + d == v) {
                     return format!("{name} foothold {j} {}", axis(v - stance.foothold.first()));
                 }
-                if let Some((k, f)) = stance.free_forces().find(|(_, f)| (0..3).any(|d| f.first() + d == v)) {
-                    return format!(
-                        "{name} force at {:.3} s {}",
-                        k as f64 * layout.time_step,
-                        axis(v - f.first())
-                    );
+                for (k, force) in stance.free_forces() {
+                    if let Some(&(first, _)) = force.terms.iter().find(|t| (t.0..t.0 + 3).contains(&v)) {
+                        return format!(
+                            "{name} force near {:.3} s {}",
+                            k as f64 * layout.time_step,
+                            axis(v - first)
+                        );
+                    }
                 }
             }
             for (j, swing) in foot.swings.iter().enumerate() {

@@ -53,6 +53,8 @@ impl FootNode {
 pub struct State {
     /// By sample.
     pub base: Vec<BaseNode>,
+    /// By sample, (p̄, θ̄) and its first and second derivatives in time.
+    pub base_motion: Vec<[[f64; 6]; 3]>,
     /// `contacts[foot][stance]`.
     pub contacts: Vec<Vec<FootNode>>,
     /// `swings[foot][k]`; stale where the foot stands.
@@ -88,6 +90,7 @@ impl State {
         let feet = model.feet();
         Self {
             base: vec![BaseNode { point, turn }; samples],
+            base_motion: vec![[[0.0; 6]; 3]; samples],
             contacts: layout.feet.iter().map(|f| vec![foot; f.stances.len()]).collect(),
             swings: vec![vec![foot; samples]; feet],
             apexes: layout.feet.iter().map(|f| vec![foot; f.swings.len()]).collect(),
@@ -110,9 +113,11 @@ impl State {
             let point = model.space.jet(&Vector3::from(node.value::<3>(x)), order);
             FootNode { point, ground: model.ground.jet(point.position.x, point.position.y) }
         };
-        for (node, base) in layout.base.iter().zip(&mut self.base) {
-            let (point, turn) = model.space.pose(&node.value::<6>(x), curved);
-            *base = BaseNode { point, turn };
+        for (k, node) in layout.base.iter().enumerate() {
+            let y = node.value::<6>(x);
+            let (point, turn) = model.space.pose(&y, curved);
+            self.base[k] = BaseNode { point, turn };
+            self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
         }
         for (i, foot) in layout.feet.iter().enumerate() {
             for (stance, contact) in foot.stances.iter().zip(&mut self.contacts[i]) {
