@@ -19,6 +19,7 @@ use crate::plan::sampled::Provenance;
 use crate::robot::Robot;
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
 use crate::terrain::{self, Ground, GroundReport};
+use crate::trajectory::Gait;
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
 use crate::{Error, Result};
 
@@ -80,6 +81,8 @@ pub fn run(
     let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
     phases_match(loaded, &robot)?;
     nlp::validate(scenario)?;
+    // Refused now and not after the map.
+    Gait::new(scenario, &robot.feet.iter().map(|foot| foot.name.clone()).collect::<Vec<_>>())?;
 
     // Whoever wishes to stop is asked again at the first iteration.
     let _ = observer(&Event::Stage("terrain"));

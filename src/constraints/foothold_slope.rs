@@ -16,7 +16,7 @@ use crate::nlp::{Model, State};
 pub struct FootholdSlope {
     max_slope: f64,
     places: Vec<(usize, usize)>,
-    samples: Vec<usize>,
+    samples: Vec<f64>,
 }
 
 impl FootholdSlope {
@@ -91,6 +91,6 @@ impl Constraint for FootholdSlope {
     }
 
     fn place(&self, row: usize) -> Place {
-        Place { foot: Some(self.places[row].0), sample: self.samples[row] as f64 }
+        Place { foot: Some(self.places[row].0), sample: self.samples[row] }
     }
 }
