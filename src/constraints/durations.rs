@@ -6,13 +6,14 @@
 //!   least ≤ a_0 Δt,  least ≤ T − b_last Δt   the first and the last stance, which include standing at both ends
 //! ```
 //!
-//! That the durations of a foot sum to the horizon T needs no row: the switches are the variables. Rows: by foot, its phases
+//! A swing takes at least [`SHORTEST_SWING`] time steps besides. That the durations of a foot sum to the horizon T needs no row: the switches are the variables. Rows: by foot, its phases
 //! in order of time, s.
 
 use super::{Constraint, Place};
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
+use crate::trajectory::switches::SHORTEST_SWING;
 
 /// Durations within bounds.
 #[derive(Clone, Debug)]
@@ -78,11 +79,13 @@ impl Constraint for Durations {
         self.phases.len()
     }
 
-    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(self.bounds[0]);
-        for (upper, phase) in upper.iter_mut().zip(&self.phases) {
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        for (r, phase) in self.phases.iter().enumerate() {
             let inner = matches!((phase.start, phase.end), (Edge::Switch { .. }, Edge::Switch { .. }));
-            *upper = if inner { self.bounds[1] } else { f64::INFINITY };
+            let swings = matches!(phase.start, Edge::Switch { which: 0, .. });
+            let least = if swings { SHORTEST_SWING * model.layout.time_step } else { 0.0 };
+            lower[r] = self.bounds[0].max(least);
+            upper[r] = if inner { self.bounds[1] } else { f64::INFINITY };
         }
     }
 

@@ -5,7 +5,6 @@ use nalgebra::{Matrix3, Vector3};
 use super::model::Model;
 use crate::heightfield::Heightfield;
 use crate::scenario::Scenario;
-use crate::trajectory::layout::SwingVariables;
 use crate::trajectory::rotation::{euler, euler_angles, project_to_rotation};
 use crate::trajectory::space::Space;
 use crate::trajectory::spline::SWING_CONTROL_POINTS;
@@ -150,7 +149,7 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
             let swings = &layout.feet[i].swings;
             let switch = |j: Option<usize>, which: usize| {
                 let swing = swings.get(j?)?;
-                swing.switches.map(|_| guessed_switches(swing)[which])
+                swing.switches.map(|_| switches::guessed(&swing.swing)[which])
             };
             switches::share(k, switch(j.checked_sub(1), 1), switch(Some(j), 0))
         })
@@ -181,7 +180,7 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
         }
         for (j, swing) in foot.swings.iter().enumerate() {
             if let Some(lift_off) = swing.switches {
-                x[lift_off..lift_off + 2].copy_from_slice(&guessed_switches(swing));
+                x[lift_off..lift_off + 2].copy_from_slice(&switches::guessed(&swing.swing));
             }
             let (from, to) = (footholds[j], footholds[j + 1]);
             for c in 0..SWING_CONTROL_POINTS {
@@ -197,11 +196,6 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
         }
     }
     Ok(x)
-}
-
-/// A little inside the nominal swing, where forces beside it have a share that can grow and shrink.
-fn guessed_switches(swing: &SwingVariables) -> [f64; 2] {
-    [swing.swing.start + switches::GUESS_SHIFT, swing.swing.end - switches::GUESS_SHIFT]
 }
 
 /// Where foot `i` would stand under a base with variables y, in the space of the variables.
