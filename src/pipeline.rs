@@ -97,7 +97,11 @@ pub fn run(
     let map = match scenario.formulation {
         Formulation::Direct => None,
         Formulation::Warped => match build_map(&ground.field, &scenario.map, true, observer)? {
-            Some(built) => Some(built),
+            Some(built) => {
+                built.report.ensure_injective()?;
+                built.tell(observer);
+                Some(built)
+            }
             None => return Ok(None),
         },
     };
@@ -144,10 +148,16 @@ pub fn build_map(
         return Ok(None);
     }
     let (map, report, cached) = found?;
-    for warning in &report.warnings {
-        let _ = observer(&Event::Note(&format!("map: {warning}")));
-    }
     Ok(Some(Built { map, report, cached }))
+}
+
+impl Built {
+    /// Tells what a user should know about the map.
+    pub fn tell(&self, observer: &mut Observer) {
+        for warning in &self.report.warnings {
+            let _ = observer(&Event::Note(&format!("map: {warning}")));
+        }
+    }
 }
 
 fn phases_match(loaded: &LoadedScenario, robot: &Robot) -> Result<()> {

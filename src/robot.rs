@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::leg::Leg;
 use crate::scenario::RobotSpec;
 use crate::scenario::document::Document;
 use crate::{Error, Result};
@@ -38,6 +39,9 @@ pub struct Foot {
     pub nominal: [f64; 3],
     /// The reachable box 𝓡ᵢ of Eq. 4.
     pub reach: Box3,
+    /// The leg, where it is known: joints then keep their speeds and torques.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leg: Option<Leg>,
 }
 
 /// Mass, inertia and reach of a robot (`robots/NAME.toml`).
@@ -128,6 +132,16 @@ impl Robot {
             }
             if !foot.reach.contains(foot.nominal) {
                 return Err(document.error(&format!("{key}.nominal"), "lies outside the foot's reach box"));
+            }
+            if let Some(leg) = &foot.leg {
+                if leg.bend.abs() != 1.0 {
+                    let what = format!("given {}, allowed: 1 or -1", leg.bend);
+                    return Err(document.error(&format!("{key}.leg.bend"), what));
+                }
+                if !leg.reaches(foot.nominal) {
+                    let what = "does not reach the foot's nominal place; lengths and hip are in m from the centre of mass";
+                    return Err(document.error(&format!("{key}.leg"), what));
+                }
             }
         }
         Ok(robot)

@@ -27,15 +27,19 @@ const TERRAINS: [(&str, &str); 5] = [
 
 /// A short motion over a terrain, with everything that can be switched on.
 fn problem(terrain: &str, formulation: &str, extra: &str) -> Problem {
+    problem_of("anymal_towr", terrain, formulation, extra)
+}
+
+fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Problem {
     let text = format!(
         "schema = 1\nformulation = \"{formulation}\"\nhorizon = 2.5\n\
-         [robot]\nname = \"anymal_towr\"\nadhesive_feet = [\"RF\"]\n\
+         [robot]\nname = \"{robot}\"\nadhesive_feet = [\"RF\"]\n\
          [terrain]\n{terrain}\nspacing = 0.05\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
          [start]\nposition = [0.3, 0.2]\n[goal]\nposition = [0.6, 0.1]\nyaw = 0.2\n\
          [map]\nmethod = \"shear\"\ncells = [24, 24, 12]\n{extra}"
     );
     let scenario: Scenario = toml::from_str(&text).expect("a scenario");
-    let robot: Robot = toml::from_str(include_str!("../robots/anymal_towr.toml")).expect("a robot");
+    let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
     let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
     let field = Arc::new(ground.field);
     let space = match formulation {
@@ -151,6 +155,32 @@ fn other_laws_and_cones_match_differences() {
     for formulation in ["warped", "direct"] {
         for extra in ["[physics]\nlaw = \"pcdm-backward\"", "[contact]\ncone = \"conformal\""] {
             check(problem(TERRAINS[1].1, formulation, extra), extra);
+        }
+    }
+}
+
+#[test]
+fn coarse_knots_and_newton_euler_match_differences() {
+    let coarse = "[discretization]\nbase_knots = 3\nforce_knots = 2";
+    for formulation in ["warped", "direct"] {
+        check(problem(TERRAINS[2].1, formulation, coarse), coarse);
+    }
+    check(problem(TERRAINS[2].1, "direct", "[physics]\nlaw = \"newton-euler\""), "newton-euler");
+}
+
+/// Of a robot with known legs: joint speeds, torques and clearance of the knees besides.
+#[test]
+fn blocks_of_known_legs_match_differences() {
+    for formulation in ["warped", "direct"] {
+        for robot in ["anymal_b", "anymal_c"] {
+            let problem = problem_of(robot, TERRAINS[0].1, formulation, "");
+            for name in ["joint speed", "joint torque"] {
+                assert!(
+                    problem.blocks().any(|(block, _)| block.name() == name && block.rows() > 0),
+                    "{name}"
+                );
+            }
+            check(problem, robot);
         }
     }
 }

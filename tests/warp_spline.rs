@@ -6,7 +6,7 @@ use warpgait::warp::{Order, WarpMap};
 
 /// A map with curvature in all three axes and components, still injective: the identity plus waves on the control points.
 fn curved() -> WarpMap {
-    let spec = MapSpec { method: MapMethod::Shear, cells: [12, 10, 6], thickness: 2.5 };
+    let spec = MapSpec { method: MapMethod::Shear, cells: Some([12, 10, 6]), ..MapSpec::default() };
     let mut grid = WarpMap::flat([-3.0, 3.0, -2.0, 3.0], &spec).unwrap().to_grid();
     for p in &mut grid.control_points {
         let [x, y, z] = *p;
@@ -126,7 +126,7 @@ fn second_derivatives_are_continuous_across_the_faces() {
 
 #[test]
 fn a_flat_map_is_the_identity_everywhere() {
-    let spec = MapSpec { cells: [9, 7, 5], ..MapSpec::default() };
+    let spec = MapSpec { cells: Some([9, 7, 5]), ..MapSpec::default() };
     let map = WarpMap::flat([-1.0, 2.0, -3.0, 3.0], &spec).unwrap();
     for x in points(&map, 0.8, 200) {
         let jet = map.jet(x, Order::Third);
@@ -168,7 +168,7 @@ fn inverse_refuses_what_lies_far_outside() {
 #[test]
 fn blending_is_linear_and_needs_one_grid() {
     let map = curved();
-    let spec = MapSpec { cells: [12, 10, 6], ..MapSpec::default() };
+    let spec = MapSpec { cells: Some([12, 10, 6]), ..MapSpec::default() };
     let flat = WarpMap::flat([-3.0, 3.0, -2.0, 3.0], &spec).unwrap();
     let half = flat.blend(&map, 0.25).unwrap();
     let x = [0.3, 0.4, 0.5];

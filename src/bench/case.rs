@@ -15,6 +15,7 @@ use crate::ipopt::NlpProblem;
 use crate::nlp::solve as nlp;
 use crate::plan::sampled::Provenance;
 use crate::plan::{CheckRow, Plan, Seconds};
+use crate::replay::{Tracked, Verdict};
 use crate::robot::Robot;
 use crate::scenario::{self, Formulation};
 use crate::terrain;
@@ -31,6 +32,8 @@ const GROUND_POINTS: usize = 60;
 pub enum Work {
     /// A plan.
     Plan,
+    /// A plan, and its replay on the full robot.
+    Track,
     /// A plan, and how long the evaluations of its NLP take.
     Speed,
     /// A map.
@@ -39,12 +42,13 @@ pub enum Work {
 
 impl Work {
     /// All of them.
-    pub const ALL: [Work; 3] = [Work::Plan, Work::Speed, Work::Map];
+    pub const ALL: [Work; 4] = [Work::Plan, Work::Track, Work::Speed, Work::Map];
 
     /// As on the command line of the process.
     pub fn name(self) -> &'static str {
         match self {
             Work::Plan => "plan",
+            Work::Track => "track",
             Work::Speed => "speed",
             Work::Map => "map",
         }
@@ -58,15 +62,21 @@ pub struct Measured {
     pub motion: Option<MotionMeasured>,
     /// The map; none for the direct formulation.
     pub map: Option<MapMeasured>,
+    /// The replay; none where there is no motion to replay.
+    #[serde(default)]
+    pub track: Option<Tracked>,
     /// Where the processor time went.
     pub cpu: Cpu,
 }
 
 impl Measured {
-    /// A motion that is solved and passes every check; a map alone that converged and is nowhere folded.
+    /// A motion that is solved and passes every check, and its replay where it was replayed; a map alone that converged and is nowhere folded.
     pub fn is_good(&self) -> bool {
         match (&self.motion, &self.map) {
-            (Some(motion), _) => motion.solved && motion.passed,
+            (Some(motion), _) => {
+                let walked = self.track.as_ref().is_none_or(|track| track.verdict == Verdict::Pass);
+                motion.solved && motion.passed && walked
+            }
             (None, Some(map)) => map.report.converged && map.report.inverted_points == 0,
             (None, None) => false,
         }
@@ -158,10 +168,14 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
 
     let start = Instant::now();
     let built = match (work, asked.formulation) {
-        (Work::Plan | Work::Speed, Formulation::Direct) => None,
+        (Work::Plan | Work::Track | Work::Speed, Formulation::Direct) => None,
         // A map that is to be measured is built, whatever the cache holds.
         (Work::Map, _) => Some(build_map(&ground.field, &asked.map, false)?),
-        _ => Some(build_map(&ground.field, &asked.map, true)?),
+        _ => {
+            let built = build_map(&ground.field, &asked.map, true)?;
+            built.1.ensure_injective()?;
+            Some(built)
+        }
     };
     let map_seconds = start.elapsed().as_secs_f64();
     cpu.map = clock.lap();
@@ -171,7 +185,7 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
         ground_errors: if work == Work::Map { ground_errors(map) } else { Vec::new() },
     });
     if work == Work::Map {
-        return Ok(Measured { motion: None, map, cpu });
+        return Ok(Measured { motion: None, map, track: None, cpu });
     }
     let warp = built.as_ref().map(|(map, _, _)| map);
     let field = Arc::new(ground.field.clone());
@@ -236,7 +250,7 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
         seconds: motion.seconds,
         evaluation,
     };
-    Ok(Measured { motion: Some(motion), map, cpu })
+    Ok(Measured { motion: Some(motion), map, track: None, cpu })
 }
 
 fn build_map(
@@ -310,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_flat_map_has_no_error() {
-        let spec = scenario::MapSpec { cells: [8, 8, 4], ..Default::default() };
+        let spec = scenario::MapSpec { cells: Some([8, 8, 4]), ..Default::default() };
         let map = WarpMap::flat([-1.0, 1.0, -1.0, 1.0], &spec).unwrap();
         let errors = ground_errors(&map);
         assert_eq!(errors.len(), GROUND_POINTS * GROUND_POINTS);

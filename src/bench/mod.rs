@@ -6,6 +6,7 @@
 //! | [`sweep`] | runs each in a process of its own, keeps finished ones |
 //! | [`case`] | what happens in that process, and what it measures |
 //! | [`clock`] | processor time |
+//! | `tracking` | replays on the full robot, summed up |
 //! | [`summary`] | rows to groups: rates, medians, failures; CSV and JSON |
 //! | [`pictures`] | drawings like the paper's |
 //!
@@ -18,6 +19,7 @@ pub mod pictures;
 pub mod protocol;
 pub mod summary;
 pub mod sweep;
+mod tracking;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -35,8 +37,8 @@ pub struct Options {
     pub quick: bool,
     /// Processes at a time.
     pub jobs: usize,
-    /// Name of a shipped robot.
-    pub robot: String,
+    /// Name of a shipped robot; none stands for the bench's own.
+    pub robot: Option<String>,
     /// Levels of the terrains.
     pub levels: Vec<String>,
     /// Formulations.
@@ -55,7 +57,7 @@ impl Default for Options {
             out: "bench".into(),
             quick: false,
             jobs: 1,
-            robot: "anymal_towr".into(),
+            robot: None,
             levels: Vec::new(),
             formulations: Vec::new(),
             terrains: Vec::new(),
@@ -87,7 +89,8 @@ pub fn run(
 ) -> Result<Option<Outcome>> {
     let folder = options.out.join(bench.name());
     std::fs::create_dir_all(&folder).map_err(|e| crate::Error::io(&folder, e))?;
-    let Some(rows) = sweep::run(bench.cases(options), options, on_progress)? else {
+    let python = if bench == Bench::Track { Some(crate::replay::python()?) } else { None };
+    let Some(rows) = sweep::run(bench.cases(options), python, options, on_progress)? else {
         return Ok(None);
     };
     let groups = summary::groups(&rows);
@@ -95,6 +98,9 @@ pub fn run(
         ("results.json".to_owned(), summary::json(bench, options, &rows, &groups)?),
         ("results.csv".to_owned(), summary::csv(&rows)),
     ];
+    if bench == Bench::Track {
+        files.push(("metrics.csv".to_owned(), tracking::metrics_csv(&rows)));
+    }
     files.extend(pictures::draw(bench, &rows, &groups));
     let mut written = Vec::new();
     for (name, text) in files {

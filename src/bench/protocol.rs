@@ -35,6 +35,8 @@ const HILL_GOALS: [[f64; 2]; GOALS] = [
 ];
 /// Distance of the goals outside the pit from its centre, m.
 const PIT_GOAL: f64 = 2.0;
+/// Knot spacings of base and forces, in time steps.
+const KNOTS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Horizons of `speed`, s.
 const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 
@@ -42,10 +44,23 @@ const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 pub const TERRAINS: [&str; 4] = ["rippled", "conic", "hilly", "pit"];
 /// Their levels.
 pub const LEVELS: [&str; 3] = ["easy", "medium", "hard"];
+/// Robots with a full model.
+pub const FULL_MODELS: [&str; 2] = ["anymal_b", "anymal_c"];
 /// Both formulations.
 pub const FORMULATIONS: [&str; 2] = ["warped", "direct"];
-/// How a map can be found.
-pub const METHODS: [&str; 6] = ["mips", "acap-local-global", "acap-newton", "dirichlet", "arap", "shear"];
+/// How a map can be found: a name and keys of `[map]`.
+pub const METHODS: [(&str, &str); 8] = [
+    ("shear", "method = \"shear\""),
+    ("dirichlet", "method = \"dirichlet\""),
+    ("arap", "method = \"arap\""),
+    ("acap-local-global, as printed", "method = \"acap-local-global\"\nscale = \"determinant\""),
+    ("acap-local-global", "method = \"acap-local-global\""),
+    ("acap-newton", "method = \"acap-newton\""),
+    ("mips", "method = \"mips\""),
+    ("auto", "method = \"auto\""),
+];
+/// Of a quick run, which is about what there is and not how good it is.
+const FEW_CELLS: &str = "cells = [24, 24, 8]\n";
 
 /// A table or figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,31 +69,37 @@ pub enum Bench {
     Table1,
     /// Fig. 4: the conformal error of the map on the ground.
     Fig4,
+    /// Fig. 5: how the map's energy falls, by the paper's methods and ours.
+    Fig5,
     /// Fig. 8: violation by iteration, for all headings.
     Fig8,
     /// Fig. 9: time to solve, for all headings.
     Fig9,
     /// Fig. 11: violation by iteration, for one climb.
     Fig11,
-    /// Success against steepness beyond the hard level.
+    /// Success against steepness beyond the hard level, and against coarser knots.
     Frontier,
     /// Maps by method, terrain and level.
     Map,
     /// Cost against the length of the motion.
     Speed,
+    /// The plans of Table I on the full robots.
+    Track,
 }
 
 impl Bench {
     /// All of them.
-    pub const ALL: [Bench; 8] = [
+    pub const ALL: [Bench; 10] = [
         Bench::Table1,
         Bench::Fig4,
+        Bench::Fig5,
         Bench::Fig8,
         Bench::Fig9,
         Bench::Fig11,
         Bench::Frontier,
         Bench::Map,
         Bench::Speed,
+        Bench::Track,
     ];
 
     /// As on the command line.
@@ -86,26 +107,42 @@ impl Bench {
         match self {
             Bench::Table1 => "table1",
             Bench::Fig4 => "fig4",
+            Bench::Fig5 => "fig5",
             Bench::Fig8 => "fig8",
             Bench::Fig9 => "fig9",
             Bench::Fig11 => "fig11",
             Bench::Frontier => "frontier",
             Bench::Map => "map",
             Bench::Speed => "speed",
+            Bench::Track => "track",
         }
     }
 
     /// The cases, in the order in which they are run.
     pub fn cases(self, options: &Options) -> Vec<Case> {
-        let protocol = Protocol { options };
+        if self == Bench::Track {
+            let robots = FULL_MODELS
+                .iter()
+                .filter(|&&name| options.robot.as_deref().is_none_or(|robot| robot == name));
+            let of = |robot: &&str| {
+                let protocol = Protocol { options, robot: robot };
+                protocol.table(Work::Track, &TERRAINS, protocol.levels(&LEVELS[..2]))
+            };
+            return robots.flat_map(of).collect();
+        }
+        let protocol = Protocol { options, robot: options.robot.as_deref().unwrap_or("anymal_towr") };
         match self {
-            Bench::Table1 => protocol.table(&TERRAINS, protocol.levels(&LEVELS)),
-            Bench::Fig8 | Bench::Fig9 => protocol.table(&["rippled", "conic"], protocol.levels(&["medium"])),
+            Bench::Table1 => protocol.table(Work::Plan, &TERRAINS, protocol.levels(&LEVELS)),
+            Bench::Fig8 | Bench::Fig9 => {
+                protocol.table(Work::Plan, &["rippled", "conic"], protocol.levels(&["medium"]))
+            }
             Bench::Fig11 => protocol.climb(),
             Bench::Fig4 => protocol.ground_errors(),
             Bench::Frontier => protocol.frontier(),
+            Bench::Fig5 => protocol.energies(),
             Bench::Map => protocol.maps(),
             Bench::Speed => protocol.speed(),
+            Bench::Track => unreachable!("handled above"),
         }
     }
 }
@@ -117,6 +154,8 @@ pub struct Case {
     pub name: String,
     /// What is computed.
     pub work: Work,
+    /// Name of the robot.
+    pub robot: String,
     /// Kind of terrain.
     pub terrain: String,
     /// Level of the terrain, or the one that it departs from.
@@ -133,6 +172,7 @@ pub struct Case {
 
 struct Protocol<'a> {
     options: &'a Options,
+    robot: &'a str,
 }
 
 /// Where a motion starts and ends.
@@ -169,13 +209,13 @@ impl Protocol<'_> {
     }
 
     /// Table I.
-    fn table(&self, terrains: &[&'static str], levels: Vec<String>) -> Vec<Case> {
+    fn table(&self, work: Work, terrains: &[&'static str], levels: Vec<String>) -> Vec<Case> {
         let mut cases = Vec::new();
         for level in &levels {
             for terrain in self.terrains(terrains) {
                 for way in thinned(ways(terrain), self.quick()) {
                     for formulation in &self.formulations() {
-                        cases.push(self.plan(Work::Plan, terrain, level, formulation, None, 10.0, &way));
+                        cases.push(self.plan(work, terrain, level, formulation, None, 10.0, &way));
                     }
                 }
             }
@@ -193,9 +233,27 @@ impl Protocol<'_> {
         self.levels(&["medium"]).iter().flat_map(one).collect()
     }
 
-    /// Success beyond the hard level.
+    /// Success beyond the hard level, and with fewer unknowns for each row of physics.
     fn frontier(&self) -> Vec<Case> {
         let mut cases = Vec::new();
+        for terrain in self.terrains(&TERRAINS) {
+            for knots in if self.quick() { &KNOTS[..2] } else { &KNOTS[..] } {
+                for way in thinned(ways(terrain), true) {
+                    for formulation in &self.formulations() {
+                        let parameter = Some(("knots", *knots));
+                        cases.push(self.plan(
+                            Work::Plan,
+                            terrain,
+                            "medium",
+                            formulation,
+                            parameter,
+                            10.0,
+                            &way,
+                        ));
+                    }
+                }
+            }
+        }
         for terrain in self.terrains(&TERRAINS) {
             let (name, values) = steeper(terrain);
             let values: Vec<f64> = if self.quick() { vec![values[0], values[4]] } else { values.to_vec() };
@@ -244,11 +302,19 @@ impl Protocol<'_> {
     }
 
     fn maps(&self) -> Vec<Case> {
-        let methods = if self.quick() { &METHODS[..1] } else { &METHODS[..] };
+        self.maps_by(&METHODS, &LEVELS)
+    }
+
+    /// Fig. 5: Algorithm 1, Gauss–Newton, and the default.
+    fn energies(&self) -> Vec<Case> {
+        self.maps_by(&METHODS[4..7], &["medium"])
+    }
+
+    fn maps_by(&self, methods: &[(&str, &str)], levels: &[&'static str]) -> Vec<Case> {
         let mut cases = Vec::new();
-        for level in &self.levels(&LEVELS) {
+        for level in &self.levels(levels) {
             for terrain in self.terrains(&TERRAINS) {
-                cases.extend(methods.iter().map(|method| self.map(terrain, level, method)));
+                cases.extend(methods.iter().map(|&method| self.map(terrain, level, method)));
             }
         }
         cases
@@ -258,19 +324,23 @@ impl Protocol<'_> {
         let default: &[&'static str] =
             if self.options.terrains.is_empty() { &["rippled"] } else { &TERRAINS };
         let levels = self.levels(&["medium"]);
-        let one =
-            |level: &String| self.terrains(default).map(|t| self.map(t, level, "mips")).collect::<Vec<_>>();
+        let one = |level: &String| {
+            self.terrains(default).map(|t| self.map(t, level, METHODS[6])).collect::<Vec<_>>()
+        };
         levels.iter().flat_map(one).collect()
     }
 
-    fn map(&self, terrain: &str, level: &str, method: &str) -> Case {
-        let name = format!("map-{terrain}-{level}-{method}");
+    fn map(&self, terrain: &str, level: &str, (method, keys): (&str, &str)) -> Case {
+        let quick = if self.quick() { "-quick" } else { "" };
+        let name = format!("map-{terrain}-{level}-{}{quick}", method.replace(", ", "-").replace(' ', "-"));
         let way = &ways(terrain)[0];
         let scenario = self.scenario(&name, terrain, level, "warped", None, 10.0, way)
-            + &format!("method = \"{method}\"\n");
+            + &format!("{keys}\n")
+            + if self.quick() { FEW_CELLS } else { cells(terrain) };
         Case {
             name,
             work: Work::Map,
+            robot: self.robot.into(),
             terrain: terrain.into(),
             level: level.into(),
             method: method.into(),
@@ -292,12 +362,14 @@ impl Protocol<'_> {
         way: &Way,
     ) -> Case {
         let varied = parameter.map_or(String::new(), |(key, value)| format!("-{key}-{value}"));
-        let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.options.robot, way.label);
+        let name = format!("{}-{terrain}-{level}{varied}-{}-{formulation}", self.robot, way.label);
         let terrain_parameter = parameter.filter(|_| work == Work::Plan);
-        let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way);
+        let scenario = self.scenario(&name, terrain, level, formulation, terrain_parameter, horizon, way)
+            + cells(terrain);
         Case {
             name,
             work,
+            robot: self.robot.into(),
             terrain: terrain.into(),
             level: level.into(),
             method: formulation.into(),
@@ -320,9 +392,13 @@ impl Protocol<'_> {
         way: &Way,
     ) -> String {
         let adhesive = if is_steep(terrain) { "\"LF\", \"RF\"" } else { "" };
-        let parameter = parameter.map_or(String::new(), |(key, value)| format!("{key} = {value:?}\n"));
-        // Cliffs need finer cells than slopes.
-        let cells = if terrain == "pit" { "64, 64, 16" } else { "48, 48, 16" };
+        let (parameter, knots) = match parameter {
+            Some(("knots", n)) => {
+                (String::new(), format!("[discretization]\nbase_knots = {n}\nforce_knots = {n}\n\n"))
+            }
+            Some((key, value)) => (format!("{key} = {value:?}\n"), String::new()),
+            None => Default::default(),
+        };
         let ([x, y], [u, v]) = (way.start, way.goal);
         format!(
             "# {name}, written by warpgait bench\n\
@@ -331,11 +407,16 @@ impl Protocol<'_> {
              [terrain]\nkind = \"{terrain}\"\nlevel = \"{level}\"\n{parameter}\
              extent = [-{RADIUS:?}, {RADIUS:?}, -{RADIUS:?}, {RADIUS:?}]\n\n\
              [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
-             [solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
-             [map]\ncells = [{cells}]\n",
-            self.options.robot
+             {knots}[solver]\nmax_iterations = 200\ntolerance = 1e-4\n\n\
+             [map]\n",
+            self.robot
         )
     }
+}
+
+/// Cliffs need finer cells than slopes.
+fn cells(terrain: &str) -> &'static str {
+    if terrain == "pit" { "cells = [64, 64, 16]\n" } else { "" }
 }
 
 /// Where the front feet may pull, as with the paper's suckers.

@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::json;
 
-use super::case::{Measured, MotionMeasured};
-use super::protocol::Bench;
+use super::case::{Measured, MotionMeasured, Work};
+use super::protocol::{Bench, Case};
 use super::sweep::Row;
-use super::{Options, Outcome};
+use super::{Options, Outcome, tracking};
+use crate::replay::{Tracked, Verdict};
 use crate::report::number;
 use crate::report::table::Table;
 use crate::{Error, Result};
@@ -14,6 +15,8 @@ use crate::{Error, Result};
 /// Cases that differ only in where the motion goes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Group {
+    /// Name of the robot.
+    pub robot: String,
     /// Kind of terrain.
     pub terrain: String,
     /// Level, or the one departed from.
@@ -50,8 +53,20 @@ pub struct Group {
     pub violation_max: Option<f64>,
     /// Mean conformal error of the map on the ground, %.
     pub conformal_error: Option<f64>,
+    /// Greatest conformal error of the map on the ground, %.
+    pub conformal_error_max: Option<f64>,
     /// Greatest distance of the map's bottom from the terrain, mm.
     pub misfit: Option<f64>,
+    /// Points where the map is folded.
+    pub inversions: Option<f64>,
+    /// The map's energy at the end, m³; energies of different methods cannot be compared.
+    pub energy: Option<f64>,
+    /// The method that made the map, where the case leaves it open.
+    pub taken: Option<&'static str>,
+    /// Replays that pass, are marginal, and fail.
+    pub replayed: [usize; 3],
+    /// The first metric that decides against a replay, with the number of replays that it decides, the most frequent first.
+    pub objections: Vec<(String, usize)>,
 }
 
 impl Group {
@@ -67,8 +82,10 @@ impl Group {
         let violations: Vec<f64> = of(&motions, |m| m.violation);
         let cpu_solve: Vec<f64> =
             measured.iter().filter(|m| m.motion.is_some()).map(|m| m.cpu.solve).collect();
+        let tracks: Vec<&Tracked> = measured.iter().filter_map(|m| m.track.as_ref()).collect();
         let maps = || measured.iter().filter_map(|m| m.map.as_ref().map(|map| (m, map)));
         Self {
+            robot: case.robot.clone(),
             terrain: case.terrain.clone(),
             level: case.level.clone(),
             method: case.method.clone(),
@@ -93,7 +110,18 @@ impl Group {
             conformal_error: greatest(
                 &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.mean).collect::<Vec<_>>(),
             ),
+            conformal_error_max: greatest(
+                &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.max).collect::<Vec<_>>(),
+            ),
             misfit: greatest(&maps().map(|(_, map)| 1e3 * map.report.misfit_max).collect::<Vec<_>>()),
+            inversions: greatest(
+                &maps().map(|(_, map)| map.report.inverted_points as f64).collect::<Vec<_>>(),
+            ),
+            energy: greatest(&maps().map(|(_, map)| map.report.energy).collect::<Vec<_>>()),
+            taken: maps().map(|(_, map)| map.report.method.name()).next(),
+            replayed: [Verdict::Pass, Verdict::Marginal, Verdict::Fail]
+                .map(|verdict| tracks.iter().filter(|track| track.verdict == verdict).count()),
+            objections: tracking::objections(&tracks),
         }
     }
 }
@@ -102,7 +130,9 @@ impl Group {
 pub fn groups(rows: &[Row]) -> Vec<Group> {
     let alike = |a: &Row, b: &Row| {
         let (a, b) = (&a.case, &b.case);
-        (&a.terrain, &a.level, &a.method, a.parameter) == (&b.terrain, &b.level, &b.method, b.parameter)
+        let key =
+            |case: &Case| (case.robot.clone(), case.terrain.clone(), case.level.clone(), case.method.clone());
+        key(a) == key(b) && a.parameter == b.parameter
     };
     let mut sorted: Vec<Vec<&Row>> = Vec::new();
     for row in rows {
@@ -134,6 +164,7 @@ pub fn verdict(row: &Row) -> String {
     let Some(motion) = &measured.motion else {
         return map_verdict(measured);
     };
+    let walked = measured.track.as_ref().map_or(String::new(), tracking::verdict);
     let effort = format!("{} iterations, {} s", motion.iterations, number(measured.cpu.solve));
     match (&motion.check_error, failed_checks(motion)) {
         _ if !motion.solved => format!(
@@ -144,7 +175,7 @@ pub fn verdict(row: &Row) -> String {
             motion.worst_place
         ),
         (Some(error), _) => format!("solved ({effort}), but cannot be checked: {error}"),
-        (None, failed) if failed.is_empty() => format!("solved, checks hold ({effort})"),
+        (None, failed) if failed.is_empty() => format!("solved, checks hold ({effort}){walked}"),
         (None, failed) => format!("solved ({effort}), CHECK FAILS: {failed}"),
     }
 }
@@ -184,11 +215,15 @@ pub fn is_good(row: &Row) -> bool {
 
 /// The groups as a table, and the cases that fail with their reasons.
 pub fn table(outcome: &Outcome) -> String {
-    let mut lines =
-        match outcome.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|m| m.motion.is_some())) {
-            true => motion_table(outcome),
-            false => map_table(&outcome.groups),
-        };
+    let mut lines = match outcome.rows.iter().any(|row| row.case.work == Work::Track) {
+        true => tracking::table(&outcome.groups),
+        false => {
+            match outcome.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|m| m.motion.is_some())) {
+                true => motion_table(outcome),
+                false => map_table(&outcome.groups),
+            }
+        }
+    };
     let failing: Vec<&Row> = outcome.rows.iter().filter(|row| !is_good(row)).collect();
     if !failing.is_empty() {
         lines.push(format!("\n{} of {} cases fail:", failing.len(), outcome.rows.len()));
@@ -283,17 +318,33 @@ fn evaluations(rows: &[Row]) -> Vec<String> {
 }
 
 fn map_table(groups: &[Group]) -> Vec<String> {
-    let mut table = Table::new(&["terrain", "level", "method", ">CPU s", ">conformal error %", ">misfit mm"]);
+    let mut table = Table::new(&[
+        "terrain",
+        "level",
+        "method",
+        ">CPU s",
+        ">conformal error %",
+        ">most",
+        ">misfit mm",
+        ">inversions",
+        ">energy m³",
+    ]);
     for group in groups {
-        let figures = [group.cpu_map, group.conformal_error, group.misfit].map(shown);
-        table.row(
-            [group.terrain.clone(), group.level.clone(), group.method.clone()].into_iter().chain(figures),
-        );
+        let method = match group.taken {
+            Some(taken) if group.method == "auto" => format!("auto: {taken}"),
+            _ => group.method.clone(),
+        };
+        let [cpu, mean, most, misfit, energy] =
+            [group.cpu_map, group.conformal_error, group.conformal_error_max, group.misfit, group.energy]
+                .map(shown);
+        let inversions = plain(group.inversions);
+        let figures = [cpu, mean, most, misfit, inversions, energy];
+        table.row([group.terrain.clone(), group.level.clone(), method].into_iter().chain(figures));
     }
     table.lines(|_, _, text| text)
 }
 
-fn share(part: usize, all: usize) -> String {
+pub(super) fn share(part: usize, all: usize) -> String {
     format!("{part} ({:.0} %)", 100.0 * part as f64 / all as f64)
 }
 
@@ -313,6 +364,7 @@ pub(super) fn json(bench: Bench, options: &Options, rows: &[Row], groups: &[Grou
             let case = &row.case;
             json!({
                 "name": case.name,
+                "robot": case.robot,
                 "terrain": case.terrain,
                 "level": case.level,
                 "method": case.method,
@@ -344,9 +396,11 @@ fn machine() -> String {
     format!("{} × {count}", model.map_or("processor of unknown model", |(_, name)| name))
 }
 
-const COLUMNS: &str = "case,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
-    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,misfit_mm,\
-    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,verdict";
+const COLUMNS: &str = "case,robot,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
+    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,\
+    conformal_error_most_percent,misfit_mm,inversions,energy_m3,\
+    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,\
+    replay,replay_decided_by,replay_s,verdict";
 
 /// `results.csv`: one row a case; what does not apply stays empty.
 pub(super) fn csv(rows: &[Row]) -> String {
@@ -363,9 +417,11 @@ fn csv_row(row: &Row) -> Vec<String> {
     let measured = row.outcome.as_ref().ok();
     let motion = measured.and_then(|m| m.motion.as_ref());
     let map = measured.and_then(|m| m.map.as_ref());
+    let track = measured.and_then(|m| m.track.as_ref());
     let evaluation = motion.and_then(|m| m.evaluation.as_ref());
     vec![
         case.name.clone(),
+        case.robot.clone(),
         case.terrain.clone(),
         case.level.clone(),
         case.method.clone(),
@@ -384,18 +440,24 @@ fn csv_row(row: &Row) -> Vec<String> {
         cell(map.map(|m| m.cached)),
         cell(map.map(|m| m.report.seconds)),
         cell(map.map(|m| 100.0 * m.report.conformal_ground.mean)),
+        cell(map.map(|m| 100.0 * m.report.conformal_ground.max)),
         cell(map.map(|m| 1e3 * m.report.misfit_max)),
+        cell(map.map(|m| m.report.inverted_points)),
+        cell(map.map(|m| m.report.energy)),
         cell(evaluation.map(|e| e.constraints)),
         cell(evaluation.map(|e| e.jacobian)),
         cell(evaluation.map(|e| e.hessian)),
         cell(motion.map(|m| m.seconds.evaluation)),
         cell(motion.map(|m| m.seconds.linear_solver)),
         cell(motion.map(|m| m.seconds.total)),
+        cell(track.map(|t| t.verdict.word())),
+        cell(track.and_then(|t| Some(t.first_failing()?.name.clone()))),
+        cell(track.map(|t| t.seconds)),
         verdict(row),
     ]
 }
 
-fn cell(value: Option<impl ToString>) -> String {
+pub(super) fn cell(value: Option<impl ToString>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }
 
@@ -404,7 +466,7 @@ fn case_cell(row: &Row, value: Option<bool>) -> String {
 }
 
 /// A cell of RFC 4180.
-fn quoted(cell: &str) -> String {
+pub(super) fn quoted(cell: &str) -> String {
     match cell.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),
         false => cell.to_owned(),
@@ -420,7 +482,7 @@ mod tests {
     fn row(index: usize, motion: MotionMeasured, seconds: f64) -> Row {
         let case = Bench::Table1.cases(&Options::default()).remove(2 * index);
         let cpu = Cpu { solve: seconds, ..Cpu::default() };
-        Row { case, outcome: Ok(Measured { motion: Some(motion), map: None, cpu }) }
+        Row { case, outcome: Ok(Measured { motion: Some(motion), map: None, track: None, cpu }) }
     }
 
     fn rows() -> Vec<Row> {

@@ -1,14 +1,14 @@
 //! Runs cases in processes of their own (Ipopt is not re-entrant), keeps what is finished, goes on where it stopped.
 //!
 //! In the folder of results: `cases/NAME.json` a finished case, `cases/NAME.toml` its scenario, `cases/NAME.log` what its
-//! process said, `plans/NAME.plan.npz` its plan unless all is well with it, `maps/` the maps of this program. A finished case carries the SHA-256 of
+//! process said, `plans/NAME.plan.npz` its plan unless all is well with it (its replay included), `maps/` the maps of this program. A finished case carries the SHA-256 of
 //! its scenario and of the program; when either is another, it is computed again. A case without a result is a row with
 //! its reason, and is tried again next time.
 
 use std::collections::VecDeque;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
@@ -16,10 +16,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::Options;
-use super::case::Measured;
+use super::case::{Measured, Work};
 use super::protocol::Case;
 use crate::ipopt::INTERRUPT;
 use crate::plan::npz::write_atomically;
+use crate::replay::Tracked;
 use crate::{Error, Result};
 
 /// How often a running process is looked at.
@@ -59,16 +60,17 @@ struct Kept {
     measured: Measured,
 }
 
-/// Runs all cases that are not there yet and returns the rows in the order of the cases; none when interrupted.
+/// Runs all cases that are not there yet, replays their plans with `python` where they ask for it, and returns the rows in the order of the cases; none when interrupted.
 ///
 /// # Errors
 /// When the folder of results cannot be written. Whatever happens to a case is no error but its row.
 pub fn run(
     cases: Vec<Case>,
+    python: Option<PathBuf>,
     options: &Options,
     on_progress: &mut dyn FnMut(&SweepProgress),
 ) -> Result<Option<Vec<Row>>> {
-    let place = Place::new(&options.out)?;
+    let place = Place { python, ..Place::new(&options.out)? };
     let all = cases.len();
     let mut rows: Vec<Option<Row>> = Vec::with_capacity(all);
     let mut open: VecDeque<(usize, Case)> = VecDeque::new();
@@ -119,6 +121,8 @@ struct Place {
     maps: PathBuf,
     program: PathBuf,
     digest: String,
+    /// With the package that replays; none where nothing is replayed.
+    python: Option<PathBuf>,
 }
 
 impl Place {
@@ -132,6 +136,7 @@ impl Place {
             maps: out.join("maps").join(&digest[..16]),
             program,
             digest,
+            python: None,
         };
         for folder in [&place.cases, &place.plans, &place.maps] {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
@@ -156,7 +161,11 @@ impl Place {
 
     /// Computes a case in a process of its own.
     fn compute(&self, case: &Case, limit: Duration) -> std::result::Result<Measured, String> {
-        let measured = self.spawn(case, limit)?;
+        let start = Instant::now();
+        let mut measured = self.spawn(case, limit)?;
+        if let (Work::Track, Some(python), true) = (case.work, &self.python, measured.is_good()) {
+            measured.track = Some(self.replay(python, case, limit.saturating_sub(start.elapsed()))?);
+        }
         if measured.is_good() {
             // Plans are megabytes; those that are looked into are those that fail. A map has none to remove.
             let _ = std::fs::remove_file(self.plan(case));
@@ -173,35 +182,13 @@ impl Place {
         write_atomically(&scenario, case.scenario.as_bytes()).map_err(|e| e.to_string())?;
         // What an earlier attempt left must not be taken for this one's result.
         let _ = std::fs::remove_file(&result);
-        let said = File::create(&log).map_err(|e| format!("{}: {e}", log.display()))?;
-        let mut child = Command::new(&self.program)
+        let mut command = Command::new(&self.program);
+        command
             .args(["bench-case", case.work.name()])
             .args([&scenario, &self.plan(case), &result])
             .env("WARPGAIT_CACHE", &self.maps)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(said)
-            .spawn()
-            .map_err(|e| format!("cannot start {}: {e}", self.program.display()))?;
-        let start = Instant::now();
-        let status = loop {
-            match child.try_wait() {
-                Ok(Some(status)) => break status,
-                Ok(None) => {}
-                Err(error) => return Err(format!("lost sight of the process: {error}")),
-            }
-            let late = start.elapsed() > limit;
-            if late || INTERRUPT.is_raised() {
-                // It may have ended in between, which is as well.
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(match late {
-                    true => format!("took longer than {} s (--time-limit)", limit.as_secs()),
-                    false => "interrupted".into(),
-                });
-            }
-            std::thread::sleep(POLL);
-        };
+            .stdout(Stdio::null());
+        let status = wait(command, &log, limit)?;
         let read = std::fs::read(&result).ok().and_then(|json| serde_json::from_slice(&json).ok());
         let _ = std::fs::remove_file(&result);
         match read {
@@ -211,6 +198,58 @@ impl Place {
             }
             _ => Err(reason(&status.to_string(), &std::fs::read_to_string(&log).unwrap_or_default())),
         }
+    }
+
+    /// Replays the plan of a case, in a process of its own as well: Python's simulation.
+    fn replay(&self, python: &Path, case: &Case, limit: Duration) -> std::result::Result<Tracked, String> {
+        let (report, log) = (self.file(case, "report"), self.file(case, "log"));
+        let printed = File::create(&report).map_err(|e| format!("{}: {e}", report.display()))?;
+        let mut command = Command::new(python);
+        command
+            .args(["-m", "warpgait.validate", "--json", "--no-files", "--no-second-opinion"])
+            .arg(self.plan(case))
+            // The matrices are small: more threads only get in each other's way.
+            .env("OPENBLAS_NUM_THREADS", "1")
+            .stdout(printed);
+        let status = wait(command, &log, limit).map_err(|e| format!("replay: {e}"))?;
+        let text = std::fs::read(&report).unwrap_or_default();
+        let _ = std::fs::remove_file(&report);
+        // 0: walks; 1: does not; anything else is no verdict.
+        if !matches!(status.code(), Some(0 | 1)) {
+            let said = std::fs::read_to_string(&log).unwrap_or_default();
+            return Err(format!("replay: {}", reason(&status.to_string(), &said)));
+        }
+        let _ = std::fs::remove_file(&log);
+        Tracked::read(&text)
+    }
+}
+
+/// Runs a program to its end, at most as long as `limit`; what it says on standard error goes to `log`.
+fn wait(mut command: Command, log: &Path, limit: Duration) -> std::result::Result<ExitStatus, String> {
+    let said = File::create(log).map_err(|e| format!("{}: {e}", log.display()))?;
+    let mut child = command
+        .stdin(Stdio::null())
+        .stderr(said)
+        .spawn()
+        .map_err(|e| format!("cannot start {}: {e}", Path::new(command.get_program()).display()))?;
+    let start = Instant::now();
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Ok(status),
+            Ok(None) => {}
+            Err(error) => return Err(format!("lost sight of the process: {error}")),
+        }
+        let late = start.elapsed() > limit;
+        if late || INTERRUPT.is_raised() {
+            // It may have ended in between, which is as well.
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(match late {
+                true => format!("took longer than {} s (--time-limit)", limit.as_secs()),
+                false => "interrupted".into(),
+            });
+        }
+        std::thread::sleep(POLL);
     }
 }
 

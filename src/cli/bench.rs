@@ -30,9 +30,9 @@ pub(super) struct BenchArguments {
     /// Cases at a time; more than 1 disturbs the timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
-    /// A shipped robot
-    #[arg(long, value_name = "NAME", default_value = "anymal_towr", value_parser = PossibleValuesParser::new(Robot::shipped()))]
-    robot: String,
+    /// A shipped robot [default: anymal_towr; for track: anymal_b and anymal_c, which have full models]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Robot::shipped()))]
+    robot: Option<String>,
     /// Only these levels of the terrains
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(LEVELS))]
     level: Vec<String>,
@@ -82,7 +82,7 @@ pub(super) fn bench(arguments: BenchArguments, console: &Console) -> Result<Endi
     };
     if arguments.name.cases(&options).is_empty() {
         return Err(Error::input(format!(
-            "bench {}: nothing is left to run with these --terrain, --level and --formulation",
+            "bench {}: nothing is left to run with these --robot, --terrain, --level and --formulation",
             arguments.name.name()
         )));
     }

@@ -10,7 +10,7 @@ use super::Ending;
 use super::console::Console;
 use super::progress::Progress;
 use crate::heightfield::Heightfield;
-use crate::pipeline::{self, Built};
+use crate::pipeline::{self, Built, Event};
 use crate::plan::npz::{NpzWriter, ensure_writable};
 use crate::report::map_table;
 use crate::scenario;
@@ -41,12 +41,13 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir)?;
     let mut progress = Progress::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
-    let built =
-        pipeline::build_map(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut |event| {
-            progress.show(event);
-            ControlFlow::Continue(())
-        })?;
+    let mut show = |event: &Event| {
+        progress.show(event);
+        ControlFlow::Continue(())
+    };
+    let built = pipeline::build_map(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut show)?;
     let Some(built) = built else { return Ok(Ending::Interrupted) };
+    built.tell(&mut show);
     drop(progress);
     let Built { map, report, cached } = &built;
     if let Some(output) = &arguments.output {

@@ -66,6 +66,11 @@ impl Dynamics {
         })
     }
 
+    /// The forces and torques of each sample alone, for [`super::newton_euler`].
+    pub(super) fn wrench(intervals: usize) -> Self {
+        Self::new(intervals, |k| Stencil { wrench: vec![(k, 1.0)], ..Stencil::default() })
+    }
+
     fn new(intervals: usize, inner: impl Fn(usize) -> Stencil) -> Self {
         let stencils = (0..=intervals)
             .map(|k| {

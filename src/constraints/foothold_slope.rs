@@ -1,6 +1,10 @@
-//! Footholds where the ground is not too steep: ‖∇h(p_i)‖² ≤ max_slope².
+//! Footholds where the ground is not too steep, and not at the edge of where it is.
 //!
-//! Rows: one a stance, no unit.
+//! ```text
+//!   ‖∇h(p_i + d)‖² ≤ max_slope²,   d = 0, (±margin, 0, 0), (0, ±margin, 0)
+//! ```
+//!
+//! Rows: five a stance, no unit.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,25 +12,38 @@ use super::stance::all_stances;
 use super::{Constraint, Place};
 use crate::heightfield::HeightJet;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::state::{Curvature, FootNode, Tangent};
 use crate::nlp::{Model, State};
 
 /// Footholds on gentle ground.
 #[derive(Clone, Debug)]
 pub struct FootholdSlope {
     max_slope: f64,
-    places: Vec<(usize, usize)>,
+    /// (foot, stance, where to look).
+    places: Vec<(usize, usize, [f64; 2])>,
     samples: Vec<f64>,
 }
 
+/// Where to look about a foothold, in margins.
+const AROUND: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+
 impl FootholdSlope {
-    /// For every stance of a foot that does not adhere.
-    pub fn new(model: &Model, max_slope: f64) -> Self {
-        let (places, samples) = all_stances(model);
-        let (places, samples) =
-            places.into_iter().zip(samples).filter(|((i, _), _)| !model.adhesive[*i]).unzip();
+    /// For every stance of a foot that does not adhere; `margin` in m.
+    pub fn new(model: &Model, max_slope: f64, margin: f64) -> Self {
+        let (stances, middles) = all_stances(model);
+        let (mut places, mut samples) = (Vec::new(), Vec::new());
+        for ((i, j), sample) in stances.into_iter().zip(middles) {
+            if !model.adhesive[i] {
+                places.extend(AROUND.map(|[x, y]| (i, j, [margin * x, margin * y])));
+                samples.extend([sample; AROUND.len()]);
+            }
+        }
         Self { max_slope, places, samples }
     }
+}
+
+fn ground(model: &Model, contact: &FootNode, d: [f64; 2]) -> HeightJet {
+    model.ground.jet(contact.point.position.x + d[0], contact.point.position.y + d[1])
 }
 
 /// ∇(‖∇h‖²) in the ambient position.
@@ -58,18 +75,19 @@ impl Constraint for FootholdSlope {
         upper.fill(self.max_slope * self.max_slope);
     }
 
-    fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
-        for (value, &(i, j)) in out.iter_mut().zip(&self.places) {
-            let [x, y] = state.contacts[i][j].ground.d1;
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+        for (value, &(i, j, d)) in out.iter_mut().zip(&self.places) {
+            let [x, y] = ground(model, &state.contacts[i][j], d).d1;
             *value = x * x + y * y;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (r, &(i, j)) in self.places.iter().enumerate() {
+        for (r, &(i, j, d)) in self.places.iter().enumerate() {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
-            Tangent::position(model, &contact.point, node).row(first + r, &gradient(&contact.ground), sink);
+            let slope = gradient(&ground(model, contact, d));
+            Tangent::position(model, &contact.point, node).row(first + r, &slope, sink);
         }
     }
 
@@ -81,11 +99,12 @@ impl Constraint for FootholdSlope {
         curvature: &mut Curvature,
         sink: &mut Sink,
     ) {
-        for (&lambda, &(i, j)) in multipliers.iter().zip(&self.places) {
+        for (&lambda, &(i, j, d)) in multipliers.iter().zip(&self.places) {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
-            curvature.contacts[i][j] += gradient(&contact.ground) * lambda;
-            let form = curvature_form(&contact.ground) * lambda;
+            let ground = ground(model, contact, d);
+            curvature.contacts[i][j] += gradient(&ground) * lambda;
+            let form = curvature_form(&ground) * lambda;
             Tangent::position(model, &contact.point, node).quadratic(&form, sink);
         }
     }

@@ -12,7 +12,7 @@ use crate::nlp::state::{Curvature, Tangent};
 use crate::nlp::{Model, State};
 use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::cross_matrix;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Feet within reach at every sample.
 #[derive(Clone, Debug)]
@@ -89,6 +89,32 @@ pub(crate) fn say_curvature(
     let turn = Tangent::turn(model, base, node);
     turn.cross(&form, &Tangent::position(model, &foot.point, state.foot_node(i, k)), sink);
     turn.cross(&-form, &Tangent::position(model, &base.point, node), sink);
+}
+
+/// Second derivatives of ½ (change of r)ᵀ Q (change of r), Q symmetric, base frame; those of r itself are not in it.
+pub(crate) fn say_quadratic(
+    model: &Model,
+    state: &State,
+    (i, k): (usize, usize),
+    form: &Matrix3<f64>,
+    sink: &mut Sink,
+) {
+    let (base, foot) = (&state.base[k], state.foot(model, i, k));
+    let r = base.rotation();
+    let form = r * form * r.transpose();
+    // R (change of r) = [arm] δ + dp_i − dp.
+    let arm = cross_matrix(&(foot.point.position - base.position()));
+    let by_turn = arm.transpose() * form;
+    let node = &model.layout.base[k];
+    let turn = Tangent::turn(model, base, node);
+    let body = Tangent::position(model, &base.point, node);
+    let foot = Tangent::position(model, &foot.point, state.foot_node(i, k));
+    turn.quadratic(&(by_turn * arm), sink);
+    body.quadratic(&form, sink);
+    foot.quadratic(&form, sink);
+    turn.cross(&by_turn, &foot, sink);
+    turn.cross(&-by_turn, &body, sink);
+    body.cross(&-form, &foot, sink);
 }
 
 /// r = Rᵀ(p_i − p), m.

@@ -137,7 +137,7 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
         let t = match block {
             0 => 0.0,
             b if b + 1 == layout.base_blocks => last,
-            b => (b + 1) as f64 * layout.time_step,
+            b => (b + 1) as f64 * layout.base_knot_spacing(),
         };
         x[6 * block..6 * block + 6].copy_from_slice(&base_at(t));
     }
@@ -175,7 +175,9 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
             let jacobian = model.space.jet(&foothold, Order::First).jacobian;
             let up = jacobian.try_inverse().map_or_else(Vector3::z, |inverse| inverse * Vector3::z());
             for (k, node) in stance.free_forces() {
-                x[node.first()..][..3].copy_from_slice((up / bearing[k]).as_slice());
+                for &(variable, _) in &node.terms {
+                    x[variable..][..3].copy_from_slice((up / bearing[k]).as_slice());
+                }
             }
         }
         for (j, swing) in foot.swings.iter().enumerate() {

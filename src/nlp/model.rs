@@ -5,8 +5,10 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::heightfield::Heightfield;
+use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
+use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Layout};
 use crate::{Error, Result};
@@ -34,6 +36,8 @@ pub struct Model {
     pub nominal: Vec<Vector3<f64>>,
     /// By foot.
     pub reach: Vec<Box3>,
+    /// By foot, where the robot's file knows it.
+    pub legs: Vec<Option<Leg>>,
     /// By foot.
     pub foot_names: Vec<String>,
     /// By foot.
@@ -80,12 +84,20 @@ impl Model {
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),
+            legs: robot.feet.iter().map(|f| f.leg).collect(),
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
             foot_names,
             underside,
             ground,
             space,
-            layout: Layout::new(&gait, scenario.time_step),
+            layout: Layout::new(
+                &gait,
+                scenario.time_step,
+                KnotSpacing {
+                    base: scenario.discretization.base_knots,
+                    force: scenario.discretization.force_knots,
+                },
+            ),
         })
     }
 

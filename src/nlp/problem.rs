@@ -8,6 +8,9 @@ use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
 use crate::constraints::friction_conformal::FrictionConformal;
 use crate::constraints::goal::Goal;
+use crate::constraints::joint_speed::JointSpeed;
+use crate::constraints::joint_torque::JointTorque;
+use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
@@ -74,7 +77,8 @@ impl Problem {
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
-                Law::Pcdm | Law::NewtonEuler => Box::new(Dynamics::centred(intervals)),
+                Law::Pcdm => Box::new(Dynamics::centred(intervals)),
+                Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
             Box::new(Reach::new(&model)),
             match contact.cone {
@@ -88,7 +92,11 @@ impl Problem {
             Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
         ];
         if let Some(max_slope) = contact.max_slope {
-            blocks.push(Box::new(FootholdSlope::new(&model, max_slope)));
+            blocks.push(Box::new(FootholdSlope::new(&model, max_slope, contact.edge_margin)));
+        }
+        if model.legs.iter().any(Option::is_some) {
+            blocks.push(Box::new(JointSpeed::new(&model)));
+            blocks.push(Box::new(JointTorque::new(&model)));
         }
         if model.layout.has_switches() {
             blocks.push(Box::new(Durations::new(&model, scenario.gait.duration_bounds)));
@@ -199,12 +207,14 @@ impl Problem {
                 if (0..3).any(|d| stance.foothold.first() + d == v) {
                     return format!("{name} foothold {j} {}", axis(v - stance.foothold.first()));
                 }
-                if let Some((k, f)) = stance.free_forces().find(|(_, f)| (0..3).any(|d| f.first() + d == v)) {
-                    return format!(
-                        "{name} force at {:.3} s {}",
-                        k as f64 * layout.time_step,
-                        axis(v - f.first())
-                    );
+                for (k, force) in stance.free_forces() {
+                    if let Some(&(first, _)) = force.terms.iter().find(|t| (t.0..t.0 + 3).contains(&v)) {
+                        return format!(
+                            "{name} force near {:.3} s {}",
+                            k as f64 * layout.time_step,
+                            axis(v - first)
+                        );
+                    }
                 }
             }
             for (j, swing) in foot.swings.iter().enumerate() {
@@ -222,8 +232,8 @@ impl Problem {
     }
 }
 
-/// The base's first control points are pinned; switches stay within their rooms; in F, the free control points of a swing stay above the ground: z̄ ≥ 0 holds for a
-/// spline whose control points obey it (Eq. 8, second line, at every instant).
+/// The base's first control points are pinned; switches stay within their rooms; in F, the free control points of a swing stay
+/// above the ground: z̄ ≥ 0 holds for a spline whose control points obey it (Eq. 8, second line, at every instant).
 fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
     let mut upper = vec![f64::INFINITY; model.layout.variables];

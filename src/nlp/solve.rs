@@ -71,9 +71,9 @@ impl Motion {
 
 /// Refuses what cannot be solved before anything is computed.
 pub fn validate(scenario: &Scenario) -> Result<()> {
-    if scenario.physics.law == Law::NewtonEuler {
+    if scenario.physics.law == Law::NewtonEuler && scenario.formulation == Formulation::Warped {
         return Err(Error::input(
-            "physics.law = \"newton-euler\" is not available yet; \"pcdm\" (the default) obeys Newton's and Euler's law between the samples as well",
+            "physics.law = \"newton-euler\" needs the orientation's second derivative in time, and the map is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default), or formulation = \"direct\"",
         ));
     }
     Ok(())
@@ -183,7 +183,7 @@ impl<'a, 'b> Run<'a, 'b> {
             solver.hessian.unwrap_or(if with_costs { Hessian::Exact } else { Hessian::LimitedMemory });
         let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
         let mut problem = Problem::new(self.scenario, model, x, choice);
-        let options = options(hessian, tolerance, budget);
+        let options = options(hessian, solver.hessian_memory, tolerance, budget);
 
         let (history, on_progress) = (&mut self.history, &mut *self.on_progress);
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
@@ -319,7 +319,7 @@ fn map_of(ground: &Heightfield, scenario: &Scenario) -> Result<WarpMap> {
 }
 
 /// Adaptive μ (monotone takes ten times the iterations) and MUMPS with the QAMD ordering (1.6 times faster than its default).
-fn options(hessian: Hessian, tolerance: f64, max_iterations: usize) -> Options {
+fn options(hessian: Hessian, memory: usize, tolerance: f64, max_iterations: usize) -> Options {
     Options::new()
         .set_int("max_iter", max_iterations as i32)
         .set_str(
@@ -329,6 +329,7 @@ fn options(hessian: Hessian, tolerance: f64, max_iterations: usize) -> Options {
                 Hessian::LimitedMemory => "limited-memory",
             },
         )
+        .set_int("limited_memory_max_history", memory as i32)
         .set_str("mu_strategy", "adaptive")
         .set_int("mumps_pivot_order", 6)
         .set_num("tol", tolerance)

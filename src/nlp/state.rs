@@ -68,6 +68,8 @@ pub struct SwingPoint {
 pub struct State {
     /// By sample.
     pub base: Vec<BaseNode>,
+    /// By sample, (p̄, θ̄) and its first and second derivatives in time.
+    pub base_motion: Vec<[[f64; 6]; 3]>,
     /// `contacts[foot][stance]`.
     pub contacts: Vec<Vec<FootNode>>,
     /// `swings[foot][k]`; stale where the foot stands.
@@ -114,6 +116,7 @@ impl State {
         let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(layout, i)).collect();
         Self {
             base: vec![BaseNode { point, turn }; samples],
+            base_motion: vec![[[0.0; 6]; 3]; samples],
             contacts: layout.feet.iter().map(|f| vec![foot; f.stances.len()]).collect(),
             swings: vec![vec![foot; samples]; feet],
             points: swing_points.iter().map(|points| vec![foot; points.len()]).collect(),
@@ -139,9 +142,11 @@ impl State {
             let point = model.space.jet(&Vector3::from(node.value::<3>(x)), order);
             FootNode { point, ground: model.ground.jet(point.position.x, point.position.y) }
         };
-        for (node, base) in layout.base.iter().zip(&mut self.base) {
-            let (point, turn) = model.space.pose(&node.value::<6>(x), curved);
-            *base = BaseNode { point, turn };
+        for (k, node) in layout.base.iter().enumerate() {
+            let y = node.value::<6>(x);
+            let (point, turn) = model.space.pose(&y, curved);
+            self.base[k] = BaseNode { point, turn };
+            self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
         }
         for (i, foot) in layout.feet.iter().enumerate() {
             for (swing, times) in foot.swings.iter().zip(&mut self.switches[i]) {
@@ -155,7 +160,7 @@ impl State {
                     self.full_forces[i][k] = contact.point.jacobian * full;
                     if let Some(timed) = &mut self.force_nodes[i][k] {
                         timed.update(&self.basis, x);
-                        let share = timed.node.terms[0].1;
+                        let share = timed.share();
                         self.warped_forces[i][k] = full * share;
                         self.forces[i][k] = self.full_forces[i][k] * share;
                     }

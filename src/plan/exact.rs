@@ -74,7 +74,7 @@ impl Plan {
         let &[points, 6] = shape else {
             return Err(wrong(
                 "base_control_points",
-                format!("shape {shape:?}, expected (intervals + 3, 6)"),
+                format!("shape {shape:?}, expected (knot intervals + 3, 6)"),
             ));
         };
         let (shape, knots) = self.spline("base_knots")?;
@@ -84,14 +84,24 @@ impl Plan {
             );
             return Err(wrong("base_knots", what));
         }
-        let intervals = points - 3;
-        let time_step = (knots[3 + intervals] - knots[3]) / intervals as f64;
-        let uniform = |i: usize| (i as f64 - 3.0) * time_step;
-        if !(time_step.is_finite() && time_step > 0.0)
-            || (0..knots.len()).any(|i| (knots[i] - uniform(i)).abs() > 1e-6 * time_step)
+        let base_intervals = points - 3;
+        let duration = knots[3 + base_intervals] - knots[3];
+        let spacing = duration / base_intervals as f64;
+        let uniform = |i: usize| (i as f64 - 3.0) * spacing;
+        if !(spacing.is_finite() && spacing > 0.0)
+            || (0..knots.len()).any(|i| (knots[i] - uniform(i)).abs() > 1e-6 * spacing)
         {
             return Err(wrong("base_knots", "not uniform with knot 3 at 0 s"));
         }
+        let (shape, _) = self.spline("force_knots")?;
+        let &[samples] = shape else {
+            return Err(wrong("force_knots", format!("shape {shape:?}, expected one row")));
+        };
+        if samples < 2 {
+            return Err(wrong("force_knots", "at least two are needed"));
+        }
+        let intervals = samples - 1;
+        let time_step = duration / intervals as f64;
         let swings = self
             .phase_durations
             .iter()
@@ -101,7 +111,7 @@ impl Plan {
         if swings.len() != self.foot_names.len() {
             return Err(Error::input("member phase_durations: needs one row for each of foot_names"));
         }
-        let layout = Layout::new(&Gait { intervals, swings }, time_step);
+        let layout = Layout::with_base_intervals(&Gait { intervals, swings }, time_step, base_intervals, 1);
         let mut x = vec![0.0; layout.variables];
         for (i, point) in base.as_chunks::<6>().0.iter().enumerate() {
             x[layout.base_block(i)..][..6].copy_from_slice(point);

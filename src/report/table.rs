@@ -131,8 +131,9 @@ pub fn map_table(report: &MapReport, cached: bool) -> String {
         0 => "nowhere folded".to_owned(),
         n => format!("FOLDED at {n} points"),
     };
+    let method = report.method.name();
     let head = format!(
-        "Map of {x}×{y}×{z} cells, {origin}in {} s: {ending} after {} iterations, {folded}\n\
+        "Map by {method} of {x}×{y}×{z} cells, {origin}in {} s: {ending} after {} iterations, {folded}\n\
          Distance from the terrain: {} mm rms, {} mm at most; least determinant {}; scale at the ground {} to {}\n",
         number(report.seconds),
         report.iterations,
@@ -151,7 +152,12 @@ pub fn map_table(report: &MapReport, cached: bool) -> String {
     row("… up to 0.5 m above", &report.conformal_near_ground, 100.0, "%");
     row("… at the torso, 0.4 to 0.6 m above", &report.conformal_torso, 100.0, "%");
     row("J z to the terrain's normal", &report.normal_angle, 1.0, "°");
-    format!("{head}{}", table.lines(|_, _, text| text).join("\n"))
+    let rejected: String = report
+        .rejected
+        .iter()
+        .map(|map| format!("Not taken: {}: {}\n", map.method.name(), map.why))
+        .collect();
+    format!("{rejected}{head}{}", table.lines(|_, _, text| text).join("\n"))
 }
 
 fn place(row: &CheckRow) -> String {

@@ -56,6 +56,9 @@ pub struct Scenario {
     /// Which form of the laws of motion.
     #[serde(default)]
     pub physics: PhysicsSpec,
+    /// How finely the motion is divided.
+    #[serde(default)]
+    pub discretization: DiscretizationSpec,
     /// How φ is found.
     #[serde(default)]
     pub map: MapSpec,
@@ -325,11 +328,14 @@ pub struct ContactSpec {
     /// Greatest slope |∇h| of a foothold; default: none.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
+    /// With `max_slope`: how far from steeper ground a foothold must be, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub edge_margin: f64,
 }
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { friction: 0.75, cone: Cone::Exact, max_slope: None }
+        Self { friction: 0.75, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
     }
 }
 
@@ -354,6 +360,24 @@ pub struct PhysicsSpec {
     pub law: Law,
 }
 
+/// `[discretization]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiscretizationSpec {
+    /// Distance of the knots of the base's spline, in time steps. More than 1 leaves fewer unknowns for each row of physics.
+    #[schemars(range(min = 1, max = 100))]
+    pub base_knots: usize,
+    /// Distance of the nodes of the forces, in time steps.
+    #[schemars(range(min = 1, max = 100))]
+    pub force_knots: usize,
+}
+
+impl Default for DiscretizationSpec {
+    fn default() -> Self {
+        Self { base_knots: 1, force_knots: 1 }
+    }
+}
+
 /// How the map is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -361,16 +385,44 @@ pub enum MapMethod {
     /// The scale-invariant energy ¼(‖J‖²/det^⅔ − 3).
     #[default]
     Mips,
-    /// Algorithm 1.
+    /// As conformal as possible by Algorithm 1; may fold.
     AcapLocalGlobal,
-    /// μ > 0, Gauss–Newton.
+    /// The same with a barrier against folds, by Gauss–Newton.
     AcapNewton,
-    /// Laplace.
+    /// Laplace; may fold.
     Dirichlet,
-    /// As rigid as possible.
+    /// As rigid as possible; may fold.
     Arap,
     /// (x, y, z + h).
     Shear,
+    /// The cheapest that is good enough.
+    Auto,
+}
+
+impl MapMethod {
+    /// As in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            MapMethod::Mips => "mips",
+            MapMethod::AcapLocalGlobal => "acap-local-global",
+            MapMethod::AcapNewton => "acap-newton",
+            MapMethod::Dirichlet => "dirichlet",
+            MapMethod::Arap => "arap",
+            MapMethod::Shear => "shear",
+            MapMethod::Auto => "auto",
+        }
+    }
+}
+
+/// The scale of the scaled rotation that J is compared with, in the `acap` methods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MapScale {
+    /// tr Σ/3, the nearest.
+    #[default]
+    Trace,
+    /// |Σ|^⅓, as in the paper.
+    Determinant,
 }
 
 /// `[map]`.
@@ -379,9 +431,11 @@ pub enum MapMethod {
 pub struct MapSpec {
     /// The method.
     pub method: MapMethod,
-    /// Cells along x, y, z.
+    /// acap-local-global, acap-newton: the scale.
+    pub scale: MapScale,
+    /// Cells along x, y, z; default: 48, 48, 16, and twice as many along x and y where the terrain bends too much for them.
     #[schemars(inner(range(min = 4, max = 512)))]
-    pub cells: [usize; 3],
+    pub cells: Option<[usize; 3]>,
     /// Height of the box, m.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub thickness: f64,
@@ -389,7 +443,14 @@ pub struct MapSpec {
 
 impl Default for MapSpec {
     fn default() -> Self {
-        Self { method: MapMethod::Mips, cells: [48, 48, 16], thickness: 2.5 }
+        Self { method: MapMethod::Mips, scale: MapScale::Trace, cells: None, thickness: 2.5 }
+    }
+}
+
+impl MapSpec {
+    /// The cells to begin with.
+    pub fn cells(&self) -> [usize; 3] {
+        self.cells.unwrap_or([48, 48, 16])
     }
 }
 
@@ -451,6 +512,9 @@ pub struct SolverSpec {
     pub continuation: Continuation,
     /// Which Hessian; default: exact where there is a cost, limited memory where there is none.
     pub hessian: Option<Hessian>,
+    /// How many steps the limited-memory Hessian remembers.
+    #[schemars(range(min = 1, max = 1000))]
+    pub hessian_memory: usize,
     /// How far to go.
     pub effort: Effort,
 }
@@ -462,6 +526,7 @@ impl Default for SolverSpec {
             tolerance: 1e-4,
             continuation: Continuation::Mode(ContinuationMode::Auto),
             hessian: None,
+            hessian_memory: 6,
             effort: Effort::Smooth,
         }
     }

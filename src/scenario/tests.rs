@@ -56,7 +56,7 @@ fn defaults_are_those_of_the_format() {
     assert_eq!(scenario.time_step, 0.05);
     assert_eq!(scenario.motion.base_clearance, 0.10);
     assert_eq!(scenario.solver.continuation, Continuation::Mode(ContinuationMode::Auto));
-    assert_eq!(scenario.map.cells, [48, 48, 16]);
+    assert_eq!(scenario.map.cells, None);
     assert_eq!(parse("s.toml", &with("schema = 1\n", "")).unwrap().schema, 1);
 }
 
@@ -165,7 +165,7 @@ fn values_can_be_set_from_the_command_line() {
     let loaded =
         set(&["gait.kind=pace", "map.cells = [8, 9, 10]", "solver.continuation=3", "goal.yaw=1e-1"]).unwrap();
     assert_eq!(loaded.scenario.gait.kind, GaitKind::Pace);
-    assert_eq!(loaded.scenario.map.cells, [8, 9, 10]);
+    assert_eq!(loaded.scenario.map.cells, Some([8, 9, 10]));
     assert_eq!(loaded.scenario.solver.continuation, Continuation::Steps(3));
     assert_eq!(loaded.scenario.goal.yaw, Some(0.1));
     // What a plan carries says the same again.
@@ -189,7 +189,18 @@ fn values_can_be_set_from_the_command_line() {
 #[test]
 fn the_schema_names_every_section() {
     let schema = json_schema();
-    for key in ["terrain", "start", "goal", "gait", "motion", "contact", "physics", "map", "solver"] {
+    for key in [
+        "terrain",
+        "start",
+        "goal",
+        "gait",
+        "motion",
+        "contact",
+        "physics",
+        "discretization",
+        "map",
+        "solver",
+    ] {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
     assert_eq!(schema["$defs"]["MotionSpec"]["properties"]["force_limit"]["maximum"], 100.0);

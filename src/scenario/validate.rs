@@ -1,7 +1,7 @@
 //! What single values cannot show: whether the values of a scenario go together.
 
 use super::document::Document;
-use super::{GaitKind, Scenario, TerrainKind};
+use super::{GaitKind, MapMethod, Scenario, TerrainKind};
 use crate::Result;
 
 /// Where h is defined when the scenario does not say, m.
@@ -14,7 +14,18 @@ pub(super) fn together(document: &Document, scenario: &Scenario) -> Result<()> {
     robot(document)?;
     terrain(document, scenario)?;
     timing(document, scenario)?;
+    map(document, scenario)?;
     gait(document, scenario)
+}
+
+fn map(document: &Document, scenario: &Scenario) -> Result<()> {
+    let given = document.table().get("map").and_then(|map| map.get("scale")).is_some();
+    let used = matches!(scenario.map.method, MapMethod::AcapLocalGlobal | MapMethod::AcapNewton);
+    if given && !used {
+        let what = "only allowed with map.method = \"acap-local-global\" or \"acap-newton\"; remove it";
+        return Err(document.error("map.scale", what));
+    }
+    Ok(())
 }
 
 fn robot(document: &Document) -> Result<()> {
@@ -110,6 +121,10 @@ fn gait(document: &Document, scenario: &Scenario) -> Result<()> {
     if gait.optimize_durations && gait.kind == GaitKind::Stand {
         let what =
             "given true, but kind = \"stand\" has no steps whose durations could be found; set it to false";
+        return Err(document.error("gait.optimize_durations", what));
+    }
+    if gait.optimize_durations && scenario.discretization.force_knots > 1 {
+        let what = "given true, but discretization.force_knots is not 1; forces follow the switches sample by sample, so set that to 1 or this to false";
         return Err(document.error("gait.optimize_durations", what));
     }
     match (&gait.phases, gait.kind) {

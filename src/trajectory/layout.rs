@@ -2,14 +2,16 @@
 //!
 //! | block | variables |
 //! | --- | --- |
-//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample; the first three coincide, and so do the last three: the motion starts and ends at rest |
+//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, coarser, about every n-th); the first three coincide, and so do the last three: the motion starts and ends at rest |
 //! | footholds | (x̄, ȳ, z̄) for each stance |
 //! | swings | three inner control points of a clamped cubic B-spline; its outer two on each side are the footholds, so that feet leave and land with zero velocity |
-//! | forces | f̄ at every sample of a stance but the switches, where it is zero; linear in between |
+//! | forces | f̄ at every sample of a stance (or, coarser, at about every n-th) but the switches, where it is zero; linear in between |
 //! | switches | lift-off and touch-down of each swing in samples, where durations are optimized; see [`super::switches`] |
 //!
 //! The base's acceleration is (nearly) piecewise linear on the same grid as the forces, and so Newton's law can hold
-//! between the samples as well as at them.
+//! between the samples as well as at them. Coarser knots are there to measure what that is worth ([`KnotSpacing`]).
+
+use std::ops::Range;
 
 use super::gait::{Gait, Stance, Swing};
 use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
@@ -54,7 +56,8 @@ impl LinearNode {
         terms.chain(self.times.iter().map(move |&(variable, by)| (variable, by[d])))
     }
 
-    fn push(&mut self, variable: usize, weight: f64) {
+    /// Adds a variable's share.
+    pub fn push(&mut self, variable: usize, weight: f64) {
         if weight.abs() < 1e-15 {
             return;
         }
@@ -63,6 +66,20 @@ impl LinearNode {
             None => self.terms.push((variable, weight)),
         }
     }
+}
+
+/// Distance of the knots, in samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KnotSpacing {
+    /// Of the base's spline; the nearest that divides the horizon is taken.
+    pub base: usize,
+    /// Of the forces; the nearest that divides each stance is taken.
+    pub force: usize,
+}
+
+impl KnotSpacing {
+    /// A knot at every sample.
+    pub const FINE: Self = Self { base: 1, force: 1 };
 }
 
 /// The variables of one stance.
@@ -136,8 +153,12 @@ pub struct Layout {
     pub intervals: usize,
     /// Number of variables.
     pub variables: usize,
+    /// Knot intervals of the base.
+    pub base_intervals: usize,
     /// The base at each sample, six components.
     pub base: Vec<LinearNode>,
+    /// Velocity and acceleration of the base at each sample, six components.
+    pub base_rates: Vec<[LinearNode; 2]>,
     /// Distinct control points of the base.
     pub base_blocks: usize,
     /// By foot.
@@ -150,22 +171,33 @@ pub struct Layout {
 
 impl Layout {
     /// Lays out the variables of a gait.
-    pub fn new(gait: &Gait, time_step: f64) -> Self {
+    pub fn new(gait: &Gait, time_step: f64, spacing: KnotSpacing) -> Self {
         let intervals = gait.intervals;
-        let base_blocks = intervals - 1;
+        Self::with_base_intervals(gait, time_step, pieces(intervals, spacing.base).max(2), spacing.force)
+    }
+
+    /// The same with a given number of knot intervals of the base, at least two.
+    pub fn with_base_intervals(gait: &Gait, time_step: f64, base_intervals: usize, force: usize) -> Self {
+        let intervals = gait.intervals;
+        let base_blocks = base_intervals - 1;
         let mut layout = Self {
             time_step,
             intervals,
             variables: 6 * base_blocks,
+            base_intervals,
             base: Vec::new(),
+            base_rates: Vec::new(),
             base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
             nearest_stance: Vec::new(),
         };
         layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
+        layout.base_rates = (0..=intervals)
+            .map(|k| [1, 2].map(|derivative| layout.base_node(k as f64, derivative)))
+            .collect();
         for foot in 0..gait.swings.len() {
-            layout.add_foot(gait, foot);
+            layout.add_foot(gait, foot, force);
         }
         layout
     }
@@ -176,7 +208,7 @@ impl Layout {
         first
     }
 
-    fn add_foot(&mut self, gait: &Gait, foot: usize) {
+    fn add_foot(&mut self, gait: &Gait, foot: usize, spacing: usize) {
         let nominal = &gait.swings[foot];
         let stances: Vec<StanceVariables> = gait
             .stances(foot)
@@ -189,7 +221,7 @@ impl Layout {
                     stance,
                     foothold: LinearNode::variable(self.take(3)),
                     first_force: samples.start,
-                    forces: samples.map(|_| LinearNode::variable(self.take(3))).collect(),
+                    forces: self.force_nodes(stance, samples, spacing),
                 }
             })
             .collect();
@@ -251,16 +283,54 @@ impl Layout {
         self.feet.iter().flat_map(|f| &f.swings).any(|s| s.switches.is_some())
     }
 
-    /// The variables of a control point of the base, 0 ≤ i < intervals + 3.
+    /// The forces at some samples of a stance: their own variables, or between those of two coarser nodes of which the ones at
+    /// switches are tied to zero.
+    fn force_nodes(&mut self, stance: Stance, samples: Range<usize>, spacing: usize) -> Vec<LinearNode> {
+        if spacing == 1 {
+            return samples.map(|_| LinearNode::variable(self.take(3))).collect();
+        }
+        let length = stance.end - stance.start;
+        let pieces = pieces(length as usize, spacing);
+        let nodes: Vec<Option<usize>> = (0..=pieces)
+            .map(|a| {
+                let tied =
+                    (a == 0 && stance.start > 0.0) || (a == pieces && stance.end < self.intervals as f64);
+                (!tied).then(|| self.take(3))
+            })
+            .collect();
+        samples
+            .map(|k| {
+                let at = (k as f64 - stance.start) * pieces as f64 / length;
+                let before = (at as usize).min(pieces - 1);
+                let share = at - before as f64;
+                let mut node = LinearNode::default();
+                for (variable, weight) in [(nodes[before], 1.0 - share), (nodes[before + 1], share)] {
+                    if let Some(variable) = variable {
+                        node.push(variable, weight);
+                    }
+                }
+                node
+            })
+            .filter(|node| !node.terms.is_empty())
+            .collect()
+    }
+
+    /// The variables of a control point of the base, 0 ≤ i < base_intervals + 3.
     pub fn base_block(&self, control_point: usize) -> usize {
-        6 * control_point.clamp(2, self.intervals).saturating_sub(2)
+        6 * control_point.clamp(2, self.base_intervals).saturating_sub(2)
+    }
+
+    /// Distance of the base's knots, s.
+    pub fn base_knot_spacing(&self) -> f64 {
+        self.time_step * self.intervals as f64 / self.base_intervals as f64
     }
 
     /// The base at time `k` in samples (any real number in range): its value, first or second derivative in time.
     pub fn base_node(&self, k: f64, derivative: usize) -> LinearNode {
-        let interval = (k.max(0.0) as usize).min(self.intervals - 1);
+        let k = k * (self.base_intervals as f64 / self.intervals as f64);
+        let interval = (k.max(0.0) as usize).min(self.base_intervals - 1);
         let weights = uniform_cubic(k - interval as f64)[derivative];
-        let scale = self.time_step.powi(-(derivative as i32));
+        let scale = self.base_knot_spacing().powi(-(derivative as i32));
         let mut node = LinearNode::default();
         for (a, weight) in weights.iter().enumerate() {
             node.push(self.base_block(interval + a), weight * scale);
@@ -344,7 +414,7 @@ impl Layout {
 
 /// The samples of a stance between two swings at which the foot may bear something: a force acts from the sample before to the
 /// sample after, all of which must lie within the stance.
-fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize) -> std::ops::Range<usize> {
+fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize) -> Range<usize> {
     let first = before.map_or(0.0, |s| {
         // At the very end of its room a switch leaves no force there.
         let earliest = s.end - s.room[1] + 1.0;
@@ -358,16 +428,46 @@ fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize
     first..((last + 1.0).max(0.0) as usize).max(first)
 }
 
+/// How many pieces of about `spacing` samples make up `length`.
+fn pieces(length: usize, spacing: usize) -> usize {
+    ((length as f64 / spacing as f64).round() as usize).clamp(1, length)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn layout() -> Layout {
+        layout_of(KnotSpacing::FINE)
+    }
+
+    fn layout_of(spacing: KnotSpacing) -> Layout {
         let gait = Gait {
             intervals: 20,
             swings: vec![vec![Swing::given(4.0, 8.0)], vec![Swing::given(10.0, 15.0)], vec![], vec![]],
         };
-        Layout::new(&gait, 0.05)
+        Layout::new(&gait, 0.05, spacing)
+    }
+
+    #[test]
+    fn coarse_knots_are_interpolated() {
+        let spacing = KnotSpacing { base: 3, force: 2 };
+        let layout = layout_of(spacing);
+        // 20 samples in 7 intervals of the base; the stance of 4 samples has nodes at 0, 2 and, tied to zero, 4.
+        assert_eq!((layout.base_intervals, layout.base_blocks), (7, 6));
+        let stance = &layout.feet[0].stances[0];
+        let first = stance.force(0).expect("the motion starts here").first();
+        let second = stance.force(2).expect("inside").first();
+        assert_eq!(stance.force(1).expect("inside").terms, [(first, 0.5), (second, 0.5)]);
+        assert_eq!(stance.force(3).expect("inside").terms, [(second, 0.5)]);
+        assert!(stance.force(4).is_none());
+        // A spline whose control points lie on a line is that line; its derivative is the slope.
+        let mut x = vec![0.0; layout.variables];
+        for block in 0..layout.base_blocks {
+            x[6 * block] = block as f64;
+        }
+        let velocity = layout.base_node(10.0, 1).value::<6>(&x)[0];
+        assert!((velocity - 7.0 / 1.0).abs() < 1e-12, "{velocity}");
     }
 
     #[test]

@@ -191,6 +191,11 @@ impl TimedNode {
         self.timing != Timing::Given
     }
 
+    /// σ of a force.
+    pub fn share(&self) -> f64 {
+        if self.is_timed() { self.node.terms[0].1 } else { 1.0 }
+    }
+
     /// Brings the weights and their derivatives to x.
     pub fn update(&mut self, basis: &SwingBasis, x: &[f64]) {
         match self.timing {

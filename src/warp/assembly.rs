@@ -57,6 +57,38 @@ impl Assembly {
     /// The energy and its gradient with respect to the coefficients (component, x, y, z in C order); infinite, with a
     /// gradient of no meaning, where J is not allowed at some point.
     pub fn energy(&self, density: impl Density, coefficients: &[f64], gradient: &mut [f64]) -> f64 {
+        self.sweep(coefficients, gradient, |_, jacobian| density.at(jacobian))
+    }
+
+    /// What a density says about its curvature at every point, in the order of [`Assembly::curved`].
+    pub fn curvatures<C>(&self, coefficients: &[f64], at: impl Fn(&[Lanes; 9]) -> C) -> Vec<C> {
+        let mut found = Vec::with_capacity(self.x.len() * self.y.len() * self.weight_z.len());
+        let mut unused = vec![0.0; coefficients.len()];
+        self.sweep(coefficients, &mut unused, |_, jacobian| {
+            found.push(at(jacobian));
+            (Lanes::ZERO, [Lanes::ZERO; 9])
+        });
+        found
+    }
+
+    /// A second derivative of the energy times a direction, from that of the density at every point.
+    pub fn curved<C>(
+        &self,
+        curvatures: &[C],
+        times: impl Fn(&C, &[Lanes; 9]) -> [Lanes; 9],
+        direction: &[f64],
+        out: &mut [f64],
+    ) {
+        self.sweep(direction, out, |at, change| (Lanes::ZERO, times(&curvatures[at], change)));
+    }
+
+    /// Visits all points, with their number and J; takes ρ and ∂ρ/∂J from the visit to the energy and its gradient.
+    fn sweep(
+        &self,
+        coefficients: &[f64],
+        gradient: &mut [f64],
+        mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
+    ) -> f64 {
         let [_, ny, nz] = self.axes.map(|a| a.len());
         let blocks = self.weight_z.len();
         let empty = |kinds: usize| vec![Lanes::ZERO; ny * kinds * blocks];
@@ -67,6 +99,7 @@ impl Assembly {
         let mut energy = 0.0;
         let mut entered = 0;
         let mut finished = 0;
+        let mut seen = 0;
         for sx in &self.x {
             while finished < sx.first {
                 self.slab_adjoint(&slab_gradients[finished % 4], finished, gradient);
@@ -82,7 +115,9 @@ impl Assembly {
             plane_gradient.fill(Lanes::ZERO);
             for sy in &self.y {
                 let weight = sx.weight * sy.weight;
-                energy += row(density, sy, weight, &self.weight_z, &plane, &mut plane_gradient);
+                let visit = |b: usize, jacobian: &[Lanes; 9]| visit(seen + b, jacobian);
+                energy += row(visit, sy, weight, &self.weight_z, &plane, &mut plane_gradient);
+                seen += blocks;
                 if !energy.is_finite() {
                     return f64::INFINITY;
                 }
@@ -209,7 +244,7 @@ fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mu
 /// Along y, and back: the energy of one row of points; its gradient is added to the plane's.
 #[inline]
 fn row(
-    density: impl Density,
+    mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
     s: &Sample,
     weight: f64,
     weight_z: &[Lanes],
@@ -222,7 +257,7 @@ fn row(
     let mut sum = Lanes::ZERO;
     for b in 0..blocks {
         let jacobian = jacobian_lanes(s, plane, blocks, b);
-        let (density, slope) = density.at(&jacobian);
+        let (density, slope) = visit(b, &jacobian);
         let weight = weight * weight_z[b];
         sum += weight * density;
         for (kind, source) in slope.iter().enumerate() {

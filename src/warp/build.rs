@@ -5,10 +5,14 @@ use std::time::Instant;
 
 use super::WarpMap;
 use super::axis::Rule;
-use super::density::Mips;
+use super::barrier::Barrier;
+use super::density::{Density, Mips};
+use super::distance::Distance;
+use super::gauss_newton::gauss_newton;
 use super::lbfgs::{Limits, Outcome, minimize};
+use super::local_global::alternate;
 use super::problem::Problem;
-use super::report::MapReport;
+use super::report::{EnergyHistory, MapReport, RejectedMap};
 use crate::heightfield::Heightfield;
 use crate::scenario::{MapMethod, MapSpec};
 use crate::{Error, Result};
@@ -42,83 +46,178 @@ const GROWTH_ITERATIONS: usize = 30;
 /// The coarsest grid has at least this many cells along each axis, where the numbers can be halved at all.
 const COARSEST: usize = 8;
 
+/// By how much cells are to be halved along x and y where the scenario does not give them: when the bottom misses the terrain by
+/// more than the first. Beyond the second the terrain has edges that cells half as large do not follow either, m.
+const WORTH_REFINING: std::ops::Range<f64> = 1e-3..1e-2;
+
 /// Finds the map over a terrain by the method of `spec`. F's box stands over the terrain's rectangle.
 ///
 /// `progress` is called once an iteration and may stop the work.
 ///
 /// # Errors
-/// For a grid that makes no sense, a method that is not available, and when `progress` says to stop. A map that is folded
-/// or did not converge is not an error: its report says so.
+/// For a grid that makes no sense, and when `progress` says to stop. A map that is folded or did not converge is not an
+/// error: its report says so.
 pub fn build(
     field: &Heightfield,
     spec: &MapSpec,
     progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
 ) -> Result<(WarpMap, MapReport)> {
     let start = Instant::now();
-    match spec.method {
-        MapMethod::Shear => {
-            let map = WarpMap::shear(field, spec)?;
-            let mut report = MapReport::measure(&map, field, spec.method);
-            report.seconds = start.elapsed().as_secs_f64();
-            Ok((map, report))
-        }
-        MapMethod::Mips => mips(field, spec, progress, start),
-        other => Err(Error::input(format!(
-            "map.method = {} is not available yet; available are \"mips\" and \"shear\"",
-            serde_json::to_string(&other).unwrap_or_default()
-        ))),
-    }
+    let (map, mut report) = match spec.method {
+        MapMethod::Auto => auto(field, spec, progress)?,
+        method => by_method(field, spec, method, progress)?,
+    };
+    report.seconds = start.elapsed().as_secs_f64();
+    Ok((map, report))
 }
 
-fn mips(
+/// In the order of their cost. (`dirichlet` is left out: wherever it serves, the shear was better at the ground; the others cost
+/// more than `mips`.)
+const CANDIDATES: [MapMethod; 2] = [MapMethod::Shear, MapMethod::Mips];
+
+/// The first of the candidates that is good enough; the last, where none is.
+fn auto(
     field: &Heightfield,
     spec: &MapSpec,
     progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
-    start: Instant,
 ) -> Result<(WarpMap, MapReport)> {
-    let mut run = Run { field, progress, outcome: Outcome::default(), notes: Vec::new() };
+    let mut trials = Vec::new();
+    let (last, first) = CANDIDATES.split_last().unwrap_or((&MapMethod::Mips, &[]));
+    for method in first {
+        let (map, mut report) = by_method(field, spec, *method, progress)?;
+        match report.shortfall() {
+            None => {
+                report.rejected = trials;
+                return Ok((map, report));
+            }
+            Some(why) => trials.push(RejectedMap { method: *method, why }),
+        }
+    }
+    let (map, mut report) = by_method(field, spec, *last, progress)?;
+    report.rejected = trials;
+    Ok((map, report))
+}
+
+fn by_method(
+    field: &Heightfield,
+    spec: &MapSpec,
+    method: MapMethod,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<(WarpMap, MapReport)> {
+    let spec = &MapSpec { method, ..spec.clone() };
+    match method {
+        MapMethod::Shear => shear(field, spec),
+        MapMethod::Mips | MapMethod::Auto => optimized(field, spec, Mips, quasi_newton, progress),
+        MapMethod::Dirichlet => optimized(field, spec, Distance::Identity, quasi_newton, progress),
+        MapMethod::Arap => optimized(field, spec, Distance::Rotation, quasi_newton, progress),
+        MapMethod::AcapLocalGlobal => optimized(
+            field,
+            spec,
+            Distance::Similarity(spec.scale),
+            |p, u, l, report| alternate(p, u, l, report),
+            progress,
+        ),
+        MapMethod::AcapNewton => {
+            optimized(field, spec, Barrier { scale: spec.scale }, gauss_newton, progress)
+        }
+    }
+}
+
+fn shear(field: &Heightfield, spec: &MapSpec) -> Result<(WarpMap, MapReport)> {
+    let map = WarpMap::shear(field, spec)?;
+    let report = MapReport::measure(&map, field, spec.method);
+    if !worth_refining(spec, &report) {
+        return Ok((map, report));
+    }
+    let [x, y, z] = report.cells;
+    let map = WarpMap::shear(field, &MapSpec { cells: Some([2 * x, 2 * y, z]), ..spec.clone() })?;
+    let report = MapReport::measure(&map, field, spec.method);
+    Ok((map, report))
+}
+
+fn worth_refining(spec: &MapSpec, report: &MapReport) -> bool {
+    spec.cells.is_none() && report.inverted_points == 0 && WORTH_REFINING.contains(&report.misfit_max)
+}
+
+/// How an energy is minimized on one grid.
+type Minimizer<D> = fn(
+    &mut Problem<'_, D>,
+    &mut Vec<f64>,
+    Limits,
+    &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
+) -> Outcome;
+
+fn quasi_newton<D: Density>(
+    problem: &mut Problem<'_, D>,
+    u: &mut Vec<f64>,
+    limits: Limits,
+    progress: &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
+) -> Outcome {
+    minimize(problem, u, limits, progress)
+}
+
+/// The map that minimizes an energy.
+fn optimized<D: Density>(
+    field: &Heightfield,
+    spec: &MapSpec,
+    density: D,
+    minimizer: Minimizer<D>,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<(WarpMap, MapReport)> {
+    let (outcome, notes, history) = (Outcome::default(), Vec::new(), Vec::new());
+    let mut run = Run { field, density, minimizer, progress, outcome, notes, history };
     let map = run.coarse_to_fine(spec, Rule::Lobatto)?;
-    let mut report = MapReport::measure(&map, field, spec.method);
-    let mut best = (map, run.outcome);
-    if report.inverted_points > 0 {
+    let report = MapReport::measure(&map, field, spec.method);
+    let mut best = (map, report, run.outcome);
+    if best.1.inverted_points > 0 && !density.may_fold() {
         // More points a cell leave less room for folds between them.
         run.notes.push(
             "the first map was folded between its quadrature points; it was built again with four Gauss points a cell and axis".into(),
         );
         let map = run.coarse_to_fine(spec, Rule::Gauss)?;
-        let second = MapReport::measure(&map, field, spec.method);
-        if second.inverted_points < report.inverted_points {
-            report = second;
-            best = (map, run.outcome);
+        let report = MapReport::measure(&map, field, spec.method);
+        if report.inverted_points < best.1.inverted_points {
+            best = (map, report, run.outcome);
         }
     }
-    report.converged = best.1.converged;
-    report.energy = best.1.value;
+    if worth_refining(spec, &best.1) {
+        let map = run.minimized(&best.0.refined([true, true, false]), Rule::Lobatto, MAX_ITERATIONS)?;
+        let report = MapReport::measure(&map, field, spec.method);
+        if report.inverted_points <= best.1.inverted_points && report.misfit_max < best.1.misfit_max {
+            best = (map, report, run.outcome);
+        }
+    }
+    let (map, mut report, outcome) = best;
+    report.converged = outcome.converged;
+    report.energy = outcome.value;
     report.iterations = run.outcome.iterations;
     report.evaluations = run.outcome.evaluations;
+    report.history = run.history;
     if !report.converged {
         report.warnings.push(format!(
             "the optimizer stopped before its rule was met (gᵀHg is {:.1e} of the energy, wanted {TOLERANCE:.0e}), as happens where the terrain is steeper than its cells can follow; the map could be better",
-            best.1.decrement / (best.1.value + ENERGY_FLOOR)
+            outcome.decrement / (outcome.value.abs() + ENERGY_FLOOR)
         ));
     }
     report.warnings.append(&mut run.notes);
-    report.seconds = start.elapsed().as_secs_f64();
-    Ok((best.0, report))
+    Ok((map, report))
 }
 
 /// One building of a map, with what has been spent on it.
-struct Run<'a> {
+struct Run<'a, D> {
     field: &'a Heightfield,
+    density: D,
+    minimizer: Minimizer<D>,
     progress: &'a mut dyn FnMut(MapProgress) -> ControlFlow<()>,
     /// The last outcome; iterations and evaluations are sums.
     outcome: Outcome,
     notes: Vec<String>,
+    history: Vec<EnergyHistory>,
 }
 
-impl Run<'_> {
+impl<D: Density> Run<'_, D> {
     fn coarse_to_fine(&mut self, spec: &MapSpec, rule: Rule) -> Result<WarpMap> {
-        let mut cells = spec.cells;
+        let mut cells = spec.cells();
         let mut halvings = Vec::new();
         loop {
             let halve = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
@@ -128,7 +227,7 @@ impl Run<'_> {
             cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
             halvings.push(halve);
         }
-        let mut map = WarpMap::shear(self.field, &MapSpec { cells, ..spec.clone() })?;
+        let mut map = WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..spec.clone() })?;
         for halve in halvings.into_iter().rev() {
             map = self.minimized(&map, rule, MAX_COARSE_ITERATIONS)?.refined(halve);
         }
@@ -138,12 +237,13 @@ impl Run<'_> {
     /// The minimizer on the grid of `start`, the map of a coarser grid.
     fn minimized(&mut self, start: &WarpMap, rule: Rule, iterations: usize) -> Result<WarpMap> {
         let cells = start.cells();
+        let thickness = start.size()[2];
         let shear =
-            WarpMap::shear(self.field, &MapSpec { cells, thickness: start.size()[2], ..MapSpec::default() })?;
+            WarpMap::shear(self.field, &MapSpec { cells: Some(cells), thickness, ..MapSpec::default() })?;
         // What is fine on the coarser grid may fold when it is moved onto the ground that only this one sees: then that
         // ground is grown in steps. The shear is never folded.
         for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
-            let mut problem = Problem::new(self.field, Mips, map, rule)?;
+            let mut problem = Problem::new(self.field, self.density, map, rule)?;
             let mut u = problem.coefficients(map);
             let gap = problem.gap(&u);
             let mut outcome = Outcome::default();
@@ -172,24 +272,27 @@ impl Run<'_> {
     /// One run of the optimizer; it is added to what has been spent.
     fn run(
         &mut self,
-        problem: &mut Problem<Mips>,
+        problem: &mut Problem<'_, D>,
         u: &mut Vec<f64>,
         cells: [usize; 3],
         iterations: usize,
     ) -> Result<Outcome> {
         let limits = Limits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR };
-        let outcome = minimize(problem, u, limits, &mut |iteration, energy, decrement| {
+        let mut energies = Vec::new();
+        let outcome = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {
+            energies.push(energy);
             (self.progress)(MapProgress {
                 cells,
                 iteration,
                 energy,
-                decrement: decrement / (energy + ENERGY_FLOOR),
+                decrement: decrement / (energy.abs() + ENERGY_FLOOR),
                 tolerance: TOLERANCE,
             })
         });
         if outcome.interrupted {
             return Err(Error::input("building the warp map was stopped before it was done"));
         }
+        self.history.push(EnergyHistory { cells, energy: energies });
         self.outcome.iterations += outcome.iterations;
         self.outcome.evaluations += outcome.evaluations;
         Ok(outcome)

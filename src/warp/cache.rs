@@ -16,7 +16,7 @@ use crate::scenario::MapSpec;
 use crate::{Error, Result};
 
 /// To be raised with every change that makes a different map of the same terrain.
-const SOLVER_VERSION: u32 = 1;
+const SOLVER_VERSION: u32 = 2;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -89,7 +89,9 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     if hex(&Sha256::digest(payload)) != header.checksum {
         return None;
     }
-    let mut map = WarpMap::flat(field.extent(), spec).ok()?;
+    // The grid may be finer than the specification says, where it does not say.
+    let spec = MapSpec { cells: Some(header.report.cells), ..spec.clone() };
+    let mut map = WarpMap::flat(field.extent(), &spec).ok()?;
     let points = map.control_points_mut();
     if payload.len() != size_of_val(points) {
         return None;

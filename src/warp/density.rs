@@ -6,7 +6,38 @@ use super::lanes::Lanes;
 pub(super) trait Density: Copy {
     /// ρ and ∂ρ/∂J; ρ is infinite where J is not allowed.
     fn at(&self, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]);
+
+    /// The energy about a conformal map is close to ½∫ (a‖∇u‖² + (b − a) Σ (∂u_c/∂x̄_c)²): a and b, for the preconditioner.
+    ///
+    /// By default those of ½(½‖∇u‖² + ⅙(div u)²), to which energies that ask for angles alone come.
+    fn stiffness(&self) -> [f64; 2] {
+        [0.5, 2.0 / 3.0]
+    }
+
+    /// Weight over z̄, in m: the ground matters most, the torso's surroundings somewhat, the top hardly.
+    fn weight(&self, z: f64) -> f64 {
+        weight(z)
+    }
+
+    /// Weight of the bottom face against the volume, m.
+    fn face_weight(&self) -> f64 {
+        FACE_WEIGHT
+    }
+
+    /// Whether a minimizer may be folded where the terrain is steep.
+    fn may_fold(&self) -> bool {
+        false
+    }
 }
+
+/// The weight over z̄ of the energies that are to be small where the feet are.
+pub(super) fn weight(z: f64) -> f64 {
+    (-z / 0.25).exp() + 0.03
+}
+
+/// The face weight of the same. At 0.7 the mean conformal error at the ground is a third larger, at torso height a thirtieth
+/// smaller (`mips`, the benchmark's terrains but the pit).
+pub(super) const FACE_WEIGHT: f64 = 1.0;
 
 /// The scale-invariant mean of the squared singular values, ρ = ¼(‖J‖² / det^⅔ − 3): zero where J is a scaled rotation
 /// (by the inequality of the means), infinite where space would fold.
@@ -40,7 +71,7 @@ impl Density for Mips {
 
 /// cof J = ∂ det J / ∂J.
 #[inline(always)]
-fn cofactors(j: &[Lanes; 9]) -> [Lanes; 9] {
+pub(super) fn cofactors(j: &[Lanes; 9]) -> [Lanes; 9] {
     [
         j[4] * j[8] - j[5] * j[7],
         j[5] * j[6] - j[3] * j[8],
@@ -76,12 +107,30 @@ fn inverse_cube_root(x: Lanes) -> Lanes {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn at(j: [f64; 9]) -> (f64, [f64; 9]) {
-        let (energy, gradient) = Mips.at(&j.map(Lanes::splat));
+    fn at(density: impl Density, j: [f64; 9]) -> (f64, [f64; 9]) {
+        let (energy, gradient) = density.at(&j.map(Lanes::splat));
         (energy.0[1], gradient.map(|g| g.0[1]))
+    }
+
+    pub fn value(density: impl Density, j: [f64; 9]) -> f64 {
+        at(density, j).0
+    }
+
+    /// The largest difference of a gradient from central differences.
+    pub fn gradient_error(density: impl Density, j: [f64; 9]) -> f64 {
+        let (_, gradient) = at(density, j);
+        let slope = |i: usize| {
+            let moved = |step: f64| {
+                let mut moved = j;
+                moved[i] += step;
+                value(density, moved)
+            };
+            (moved(1e-5) - moved(-1e-5)) / 2e-5
+        };
+        (0..9).map(|i| (slope(i) - gradient[i]).abs()).fold(0.0, f64::max)
     }
 
     #[test]
@@ -98,24 +147,14 @@ mod tests {
     #[test]
     fn mips_is_zero_on_scaled_rotations_and_infinite_on_folds() {
         let (s, c) = 0.7_f64.sin_cos();
-        let (energy, gradient) = at([3.0 * c, -3.0 * s, 0.0, 3.0 * s, 3.0 * c, 0.0, 0.0, 0.0, 3.0]);
+        let (energy, gradient) = at(Mips, [3.0 * c, -3.0 * s, 0.0, 3.0 * s, 3.0 * c, 0.0, 0.0, 0.0, 3.0]);
         assert!(energy.abs() < 1e-13 && gradient.iter().all(|g| g.abs() < 1e-13));
-        let (folded, _) = at([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0]);
+        let (folded, _) = at(Mips, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0]);
         assert_eq!(folded, f64::INFINITY);
     }
 
     #[test]
     fn mips_gradient_matches_central_differences() {
-        let j = [1.1, 0.3, -0.2, 0.1, 0.8, 0.25, -0.4, 0.2, 1.3];
-        let (_, gradient) = at(j);
-        for i in 0..9 {
-            let moved = |step: f64| {
-                let mut moved = j;
-                moved[i] += step;
-                at(moved).0
-            };
-            let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-            assert!((slope - gradient[i]).abs() < 1e-9, "{i}");
-        }
+        assert!(gradient_error(Mips, [1.1, 0.3, -0.2, 0.1, 0.8, 0.25, -0.4, 0.2, 1.3]) < 1e-9);
     }
 }

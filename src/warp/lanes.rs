@@ -1,6 +1,6 @@
 //! A few numbers at once, so that arithmetic on quadrature points is vectorized.
 
-use std::ops::{Add, AddAssign, Mul, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
 /// How many. (Loops rather than array functions below: compilers inline and vectorize these reliably.)
 pub(super) const LANES: usize = 4;
@@ -55,6 +55,7 @@ macro_rules! elementwise {
 elementwise!(Add, add, +=);
 elementwise!(Sub, sub, -=);
 elementwise!(Mul, mul, *=);
+elementwise!(Div, div, /=);
 
 impl Mul<Lanes> for f64 {
     type Output = Lanes;

@@ -2,24 +2,29 @@
 
 mod assembly;
 mod axis;
+mod barrier;
 mod basis;
 mod bottom;
 mod build;
 mod cache;
 mod density;
+mod distance;
+mod gauss_newton;
 mod inverse;
 mod lanes;
 mod lbfgs;
+mod local_global;
 mod preconditioner;
 mod problem;
 mod refine;
 mod report;
 mod shear;
+mod singular;
 mod spline;
 
 pub use build::{MapProgress, build};
 pub use cache::{build_cached, default_cache_dir};
-pub use report::{Distribution, MapReport};
+pub use report::{Distribution, EnergyHistory, MapReport, RejectedMap};
 pub use spline::{Order, WarpMap};
 
 /// φ and its derivatives at one point of F.

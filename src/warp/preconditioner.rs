@@ -1,7 +1,7 @@
 //! The inverse of a stiffness matrix on the tensor grid by fast diagonalization.
 //!
-//! For small deviations from a scaled rotation every energy here is close to ½∫ w (½‖∇u‖² + ⅙(div u)²) dV, that is, by
-//! component c, to stiffnesses of ½ across and ⅔ along axis c. On a tensor grid with weights that are products,
+//! Every energy here is, for small deviations from a conformal map and but for what couples the components, like stiffnesses of
+//! a across and b along axis c for component c (`Density::stiffness`). On a tensor grid with weights that are products,
 //!
 //!   K_c = a₀ K⊗M⊗M + a₁ M⊗K⊗M + a₂ M⊗M⊗K,
 //!
@@ -27,11 +27,16 @@ struct Component {
 }
 
 impl Preconditioner {
-    /// `samples` carry the weights; `free[c][d]`: which coefficients of component c may move along axis d.
+    /// `samples` carry the weights; `free[c][d]`: which coefficients of component c may move along axis d;
+    /// `[across, along]`: the stiffness of component c across and along axis c.
     ///
     /// # Errors
     /// Internal, when a mass matrix is not positive definite (weights that are not).
-    pub fn new(samples: [&[Sample]; 3], free: [[std::ops::Range<usize>; 3]; 3]) -> Result<Preconditioner> {
+    pub fn new(
+        samples: [&[Sample]; 3],
+        free: [[std::ops::Range<usize>; 3]; 3],
+        [across, along]: [f64; 2],
+    ) -> Result<Preconditioner> {
         let pencils = samples.map(pencil);
         let mut components = Vec::with_capacity(3);
         for (c, free) in free.iter().enumerate() {
@@ -39,7 +44,7 @@ impl Preconditioner {
             let mut values = Vec::with_capacity(3);
             for d in 0..3 {
                 let (v, lambda) = eigen(&pencils[d], &free[d])?;
-                let stiffness = if c == d { 2.0 / 3.0 } else { 0.5 };
+                let stiffness = if c == d { along } else { across };
                 vectors.push(v);
                 values.push(lambda.iter().map(|l| stiffness * l.max(0.0)).collect::<Vec<f64>>());
             }
@@ -162,15 +167,17 @@ mod tests {
         let samples = axes.map(|a| a.quadrature(Rule::Lobatto));
         let [n0, n1, n2] = axes.map(|a| a.len());
         let free = [[1..n0 - 1, 0..n1, 0..n2], [0..n0, 1..n1 - 1, 0..n2], [0..n0, 0..n1, 1..n2]];
+        let [across, along] = [0.5, 2.0 / 3.0];
         let mut preconditioner =
-            Preconditioner::new([&samples[0], &samples[1], &samples[2]], free.clone()).unwrap();
+            Preconditioner::new([&samples[0], &samples[1], &samples[2]], free.clone(), [across, along])
+                .unwrap();
         let [p0, p1, p2] = [0, 1, 2].map(|d| pencil(&samples[d]));
         let n = n0 * n1 * n2;
         let u: Vec<f64> = (0..3 * n).map(|i| (0.7 * i as f64).sin()).collect();
         let mut v = u.clone();
         preconditioner.apply(&mut v);
         for c in 0..3 {
-            let a = [0, 1, 2].map(|d| if c == d { 2.0 / 3.0 } else { 0.5 });
+            let a = [0, 1, 2].map(|d| if c == d { along } else { across });
             let matrix = p0[0].kronecker(&p1[1]).kronecker(&p2[1]) * a[0]
                 + p0[1].kronecker(&p1[0]).kronecker(&p2[1]) * a[1]
                 + p0[1].kronecker(&p1[1]).kronecker(&p2[0]) * a[2];

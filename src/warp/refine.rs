@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn refinement_changes_nothing_inside() {
-        let spec = MapSpec { cells: [6, 5, 4], ..MapSpec::default() };
+        let spec = MapSpec { cells: Some([6, 5, 4]), ..MapSpec::default() };
         let mut map = WarpMap::flat([-1.0, 2.0, 0.0, 2.0], &spec).unwrap();
         for (i, p) in map.control_points_mut().iter_mut().enumerate() {
             p[i % 3] += (1.3 * i as f64).sin();

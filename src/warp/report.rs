@@ -8,12 +8,15 @@ use super::problem::coefficients_of;
 use super::{Order, WarpMap};
 use crate::heightfield::Heightfield;
 use crate::scenario::MapMethod;
+use crate::{Error, Result};
 
 /// How the map was made and what it is like.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapReport {
     /// Which method made it.
     pub method: MapMethod,
+    /// What was tried before it, with `map.method = "auto"`.
+    pub rejected: Vec<RejectedMap>,
     /// Cells along x, y, z.
     pub cells: [usize; 3],
     /// The optimizer met its stopping rule on the finest grid (always, for methods without an optimizer).
@@ -26,6 +29,8 @@ pub struct MapReport {
     pub seconds: f64,
     /// The energy minimized, at the end, m³ (0 for methods that minimize none).
     pub energy: f64,
+    /// The energy by iteration, one entry for each run of the optimizer, coarse grids first.
+    pub history: Vec<EnergyHistory>,
     /// Greatest distance in z of the bottom face from the terrain, m.
     pub misfit_max: f64,
     /// Root of the mean square of it, m.
@@ -48,6 +53,24 @@ pub struct MapReport {
     pub scale: [f64; 2],
     /// What a user should know, in words.
     pub warnings: Vec<String>,
+}
+
+/// A map that was not good enough.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RejectedMap {
+    /// Which method made it.
+    pub method: MapMethod,
+    /// In words.
+    pub why: String,
+}
+
+/// How the energy fell in one run of the optimizer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnergyHistory {
+    /// Cells of the grid.
+    pub cells: [usize; 3],
+    /// The energy at the start and after each iteration, m³.
+    pub energy: Vec<f64>,
 }
 
 /// A weighted distribution.
@@ -90,6 +113,10 @@ const GROUND_DENSITY: usize = 3;
 const MISFIT_WARNING: f64 = 2e-3;
 /// Mean conformal error at the ground that is worth a warning.
 const CONFORMAL_WARNING: f64 = 0.10;
+/// Mean conformal error at the ground that `map.method = "auto"` accepts.
+const GOOD_CONFORMAL: f64 = 0.05;
+/// Misfit of the bottom face that it accepts, m.
+const GOOD_MISFIT: f64 = 1e-3;
 
 impl MapReport {
     /// Measures a map against its terrain. How it was made is for the caller to fill in.
@@ -100,12 +127,14 @@ impl MapReport {
         let (min_determinant, inverted_points, at) = fine.determinants(&coefficients_of(map, &axes));
         let mut report = MapReport {
             method,
+            rejected: Vec::new(),
             cells,
             converged: true,
             iterations: 0,
             evaluations: 0,
             seconds: 0.0,
             energy: 0.0,
+            history: Vec::new(),
             misfit_max: 0.0,
             misfit_rms: 0.0,
             min_determinant,
@@ -122,6 +151,49 @@ impl MapReport {
         report.measure_above(map, field);
         report.warn();
         report
+    }
+
+    /// Why `map.method = "auto"` would look further; none for a map that is good enough: injective, converged, with a mean
+    /// conformal error at the ground below 5 % and a bottom within 1 mm of the terrain.
+    pub(super) fn shortfall(&self) -> Option<String> {
+        let mean = self.conformal_ground.mean;
+        if self.inverted_points > 0 {
+            Some(format!("folded at {} points", self.inverted_points))
+        } else if !self.converged {
+            Some("the optimizer did not converge".into())
+        } else if mean > GOOD_CONFORMAL {
+            let (mean, most) = (100.0 * mean, 100.0 * GOOD_CONFORMAL);
+            Some(format!("mean conformal error at the ground {mean:.1} %, more than {most:.0} %"))
+        } else if self.misfit_max > GOOD_MISFIT {
+            let (misfit, most) = (1e3 * self.misfit_max, 1e3 * GOOD_MISFIT);
+            Some(format!("the bottom misses the terrain by up to {misfit:.1} mm, more than {most:.0} mm"))
+        } else {
+            None
+        }
+    }
+
+    /// Refuses a map that no motion can be planned over.
+    ///
+    /// # Errors
+    /// When it is folded: one place of the ground would have several counterparts, and distances a wrong sign.
+    pub fn ensure_injective(&self) -> Result<()> {
+        match self.inverted_points {
+            0 => Ok(()),
+            _ => Err(Error::input(format!("no motion can be planned over this map: {}", self.folded()))),
+        }
+    }
+
+    /// Where it is folded, and what would serve.
+    fn folded(&self) -> String {
+        let [x, y, z] = self.min_determinant_at;
+        let serve = match self.method {
+            MapMethod::Dirichlet | MapMethod::Arap | MapMethod::AcapLocalGlobal => {
+                "nothing keeps the energy of this method from folding on steep ground; use map.method = \"mips\" or \"acap-newton\", whose energies forbid it, or smooth the terrain"
+            }
+            _ => "smooth the terrain or use more cells (map.cells)",
+        };
+        let count = self.inverted_points;
+        format!("it folds at {count} points, worst near x̄ {x:.2}, ȳ {y:.2}, z̄ {z:.2} m; {serve}")
     }
 
     fn measure_ground(&mut self, map: &WarpMap, field: &Heightfield) {
@@ -178,12 +250,8 @@ impl MapReport {
     }
 
     fn warn(&mut self) {
-        let [x, y, z] = self.min_determinant_at;
         if self.inverted_points > 0 {
-            self.warnings.push(format!(
-                "the map is folded at {} points, worst near x̄ {x:.2}, ȳ {y:.2}, z̄ {z:.2} m: motions there are wrong; smooth the terrain or use more cells",
-                self.inverted_points
-            ));
+            self.warnings.push(format!("motions over this map would be wrong: {}", self.folded()));
         }
         if self.misfit_max > MISFIT_WARNING {
             self.warnings.push(format!(

@@ -277,15 +277,16 @@ fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3]
             size[0], size[1], size[2]
         )));
     }
-    if let Some(n) = spec.cells.iter().find(|n| !(4..=512).contains(*n)) {
-        return Err(Error::input(format!("map.cells = {:?}: {n} is not between 4 and 512", spec.cells)));
+    let grid = spec.cells();
+    if let Some(n) = grid.iter().find(|n| !(4..=512).contains(*n)) {
+        return Err(Error::input(format!("map.cells = {:?}: {n} is not between 4 and 512", grid)));
     }
-    let cells: usize = spec.cells.iter().product();
+    let cells: usize = grid.iter().product();
     if cells > MAX_CELLS {
         return Err(Error::input(format!(
             "map.cells = {:?} makes {cells} cells; more than {MAX_CELLS} would need gigabytes of memory",
-            spec.cells
+            grid
         )));
     }
-    Ok((spec.cells, [x_min, y_min, 0.0], size))
+    Ok((grid, [x_min, y_min, 0.0], size))
 }

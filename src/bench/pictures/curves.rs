@@ -44,36 +44,106 @@ pub(super) fn histories(rows: &[&Row]) -> String {
     svg.finish()
 }
 
-/// Shares of solved and checked motions against what makes a terrain steeper.
-pub(super) fn frontier(groups: &[Group]) -> String {
+/// Fig. 5: how far the energy is above its last value on each grid, by iteration, the grids one after another.
+pub(super) fn energies(rows: &[&Row]) -> String {
+    const COLOURS: [&str; 4] = ["#c8352c", "#e08214", "#2166ac", "#1b7837"];
     let mut svg = Svg::new(1240.0, 860.0);
-    heading(&mut svg, "Motions found beyond the hard level");
+    heading(
+        &mut svg,
+        "How the map's energy falls: (E − last)/last, coarse grids first, circles where a grid begins",
+    );
+    let methods = distinct(rows.iter().map(|row| row.case.method.as_str()));
+    let style = |method: &str| {
+        let place = methods.iter().position(|m| *m == method).unwrap_or(0);
+        COLOURS[place % COLOURS.len()]
+    };
+    let line = |method: &str| format!("stroke=\"{}\" stroke-width=\"2\"", style(method));
+    let styles: Vec<String> = methods.iter().map(|method| line(method)).collect();
+    let names: Vec<(&str, &str)> = methods.iter().copied().zip(styles.iter().map(String::as_str)).collect();
+    legend(&mut svg, [70.0, 62.0], &names);
+    for (i, terrain) in distinct(rows.iter().map(|row| row.case.terrain.as_str())).into_iter().enumerate() {
+        let frame = [90.0 + 600.0 * (i % 2) as f64, 110.0 + 380.0 * (i / 2) as f64, 500.0, 280.0];
+        let curves: Vec<(&str, Vec<Vec<f64>>)> = rows
+            .iter()
+            .filter(|row| row.case.terrain == terrain)
+            .filter_map(|row| Some((row.case.method.as_str(), excesses(row)?)))
+            .collect();
+        let all: Vec<f64> =
+            curves.iter().flat_map(|(_, grids)| grids.concat()).filter(|v| *v > 0.0).collect();
+        let longest = curves.iter().map(|(_, grids)| grids.concat().len()).max().unwrap_or(2).max(2);
+        let axes = Axes::logarithmic(frame, [0.0, (longest - 1) as f64], &all);
+        axes.draw(&mut svg, terrain, "iteration", "energy above its last value");
+        let floor = 10f64.powf(axes.y[0]);
+        svg.clipped(frame, |svg| {
+            for (method, grids) in &curves {
+                let mut from = 0;
+                for grid in grids {
+                    let points: Vec<[f64; 2]> = grid
+                        .iter()
+                        .enumerate()
+                        .map(|(k, v)| axes.at((from + k) as f64, v.max(floor)))
+                        .collect();
+                    from += grid.len();
+                    svg.circle(points[0], 3.5, &format!("fill=\"{}\"", style(method)));
+                    svg.polyline(points, &line(method));
+                }
+            }
+        });
+    }
+    svg.finish()
+}
+
+/// By run of the optimizer, the energies less the last of it, relative to that; none without a map or an optimizer.
+fn excesses(row: &Row) -> Option<Vec<Vec<f64>>> {
+    let history = &row.outcome.as_ref().ok()?.map.as_ref()?.report.history;
+    let one = |energy: &Vec<f64>| {
+        let last = *energy.last()?;
+        Some(energy.iter().map(|e| (e - last) / last.abs().max(f64::MIN_POSITIVE)).collect())
+    };
+    Some(history.iter().filter_map(|run| one(&run.energy)).collect())
+}
+
+/// Shares of solved and checked motions against what is varied: steepness on the left, knots on the right, a row a terrain.
+pub(super) fn frontier(groups: &[Group]) -> String {
+    let terrains = distinct(groups.iter().map(|group| group.terrain.as_str()));
+    let mut svg = Svg::new(1240.0, 130.0 + 350.0 * terrains.len() as f64);
+    heading(&mut svg, "Motions found beyond the hard level, and with fewer knots");
     let [warped, direct] = ["warped", "direct"].map(|method| style(method, ""));
     let solved = format!("stroke=\"#555\" stroke-width=\"2\" {DASHED}");
     let names =
         [("warped", &*warped), ("direct", &*direct), ("dashed: solved, but for the checks", &*solved)];
     legend(&mut svg, [70.0, 62.0], &names);
-    for (i, terrain) in distinct(groups.iter().map(|group| group.terrain.as_str())).into_iter().enumerate() {
+    for (row, terrain) in terrains.into_iter().enumerate() {
         let here: Vec<&Group> = groups.iter().filter(|group| group.terrain == terrain).collect();
-        let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
-        let name = here[0].parameter.map_or("", |(name, _)| name);
-        let frame = [90.0 + 600.0 * (i % 2) as f64, 110.0 + 380.0 * (i / 2) as f64, 500.0, 280.0];
-        let axes = Axes::new(frame, range(here.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
-        axes.draw(&mut svg, terrain, name, "motions found, %");
-        for method in distinct(here.iter().map(|group| group.method.as_str())) {
-            let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
-                let of_method = here.iter().filter(|group| group.method == method);
-                of_method
-                    .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
-                    .collect()
-            };
-            svg.polyline(curve(|group| group.solved), &style(method, DASHED));
-            let checked = curve(|group| group.passed);
-            svg.polyline(checked.iter().copied(), &style(method, ""));
-            checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+        let varied = distinct(here.iter().filter_map(|group| Some(group.parameter?.0)));
+        for name in varied {
+            let of: Vec<&Group> =
+                here.iter().copied().filter(|group| group.parameter.is_some_and(|p| p.0 == name)).collect();
+            let column = if name == "knots" { 1.0 } else { 0.0 };
+            curve(&mut svg, [90.0 + 600.0 * column, 110.0 + 350.0 * row as f64], terrain, name, &of);
         }
     }
     svg.finish()
+}
+
+fn curve(svg: &mut Svg, [x, y]: [f64; 2], terrain: &str, name: &str, groups: &[&Group]) {
+    let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
+    let frame = [x, y, 500.0, 250.0];
+    let axes = Axes::new(frame, range(groups.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
+    let title = if name == "knots" { format!("{terrain}, medium") } else { terrain.to_string() };
+    axes.draw(svg, &title, name, "motions found, %");
+    for method in distinct(groups.iter().map(|group| group.method.as_str())) {
+        let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
+            let of_method = groups.iter().filter(|group| group.method == method);
+            of_method
+                .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
+                .collect()
+        };
+        svg.polyline(curve(|group| group.solved), &style(method, DASHED));
+        let checked = curve(|group| group.passed);
+        svg.polyline(checked.iter().copied(), &style(method, ""));
+        checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+    }
 }
 
 /// How the cost grows with the length of the motion.

@@ -19,9 +19,11 @@ pub(super) fn draw(bench: Bench, rows: &[Row], groups: &[Group]) -> Vec<(String,
         Bench::Fig9 => by_level(&polar::times),
         Bench::Fig11 => by_level(&curves::histories),
         Bench::Fig4 => by_level(&ground::errors),
+        Bench::Fig5 => by_level(&curves::energies),
         Bench::Frontier => vec![("frontier.svg".into(), curves::frontier(groups))],
         Bench::Map => vec![("map.svg".into(), conformal_errors(groups))],
         Bench::Speed => by_level(&curves::speed),
+        Bench::Track => vec![("track.svg".into(), replays(groups))],
     }
 }
 
@@ -100,6 +102,21 @@ fn rates(groups: &[Group]) -> String {
     bars("Motions found, %: pale solved, full solved and checked", &all, 100.0)
 }
 
+/// Shares of replays that pass or are marginal.
+fn replays(groups: &[Group]) -> String {
+    let bar = |group: &Group| {
+        let [pass, marginal, _] = group.replayed;
+        let share = |count: usize| 100.0 * count as f64 / group.cases as f64;
+        Bar {
+            label: format!("{} {} {} {}", group.robot, group.terrain, group.level, group.method),
+            colour: colour(&group.method),
+            heights: vec![(share(pass + marginal), 0.35), (share(pass), 1.0)],
+        }
+    };
+    let all: Vec<Bar> = groups.iter().map(bar).collect();
+    bars("Plans that the robot walks, %: full pass, pale marginal", &all, 100.0)
+}
+
 /// Mean conformal errors of maps on the ground.
 fn conformal_errors(groups: &[Group]) -> String {
     let bar = |group: &Group| Bar {
@@ -151,7 +168,7 @@ mod tests {
             ..Default::default()
         };
         let cpu = Cpu { solve: 1.5, ..Cpu::default() };
-        let measured = Measured { motion: Some(motion), map: None, cpu };
+        let measured = Measured { motion: Some(motion), map: None, track: None, cpu };
         let cases = bench.cases(&Options { quick: true, ..Options::default() }).into_iter();
         let mut rows: Vec<Row> = cases.map(|case| Row { case, outcome: Ok(measured.clone()) }).collect();
         rows[0].outcome = Err("no result".into());

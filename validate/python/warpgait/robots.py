@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from .errors import InputError
-from .kinematics import legs
+from .kinematics import Leg, legs
 from .model import Array, Composite, available_models, check_mujoco, composite, find_model, foot_names, indices, load_spec, stand
 from .reach import Box, ReachRules, reach_box, reached
 
@@ -34,7 +34,10 @@ class CentroidalRobot:
     feet: tuple[str, ...]
     nominal: Array  # (E, 3) contact points
     reach: tuple[Box, ...]
+    legs: tuple[Leg, ...]  # hips relative to the base's origin, as the model has them
     radius: float  # m, of the feet
+    speed_limit: float  # rad/s
+    torque_limit: Array  # (E, 3) N m
 
 
 def trunk_box(model: Any) -> Box:
@@ -78,7 +81,18 @@ def derive(path: Path, rules: ReachRules | None = None, resolution: float = 0.01
     base = data.xpos[index.base] + body.center_of_mass
     nominal = data.site_xpos[index.site] - np.array([0, 0, index.radius]) - base
     torso = Box(trunk.center - body.center_of_mass, trunk.half_size)
-    return CentroidalRobot(path.stem, body, torso, feet, nominal, tuple(boxes), index.radius)
+    return CentroidalRobot(
+        name=path.stem,
+        body=body,
+        torso=torso,
+        feet=feet,
+        nominal=nominal,
+        reach=tuple(boxes),
+        legs=tuple(all_legs),
+        radius=index.radius,
+        speed_limit=index.speed_limit,
+        torque_limit=index.torque_limit,
+    )
 
 
 def _row(values: Array, digits: int = 3) -> str:
@@ -104,13 +118,28 @@ def to_toml(robot: CentroidalRobot) -> str:
         "# Reach: the largest box of contact points within joint limits, the knee bent by 0.35–2.6 rad, |HFE| ≤ 100°, the foot clear of the",
         f"# trunk, on ground tilted by up to 30°, with edges of at least {_row(LEAST_BOX, 2)} m.",
     ]
-    for name, nominal, box in zip(robot.feet, robot.nominal, robot.reach, strict=True):
+    lines += [
+        "# Legs: hip is x of the flexion axis, y and z of the abduction axis; lengths to the foot's centre, in the plane of the leg.",
+    ]
+    for name, nominal, box, leg, torque in zip(
+        robot.feet, robot.nominal, robot.reach, robot.legs, robot.torque_limit, strict=True
+    ):
+        hip = leg.hip + [leg.flexion_offset, 0, 0] - c
         lines += [
             "",
             "[[feet]]",
             f'name = "{name}"',
             f"nominal = {_row(nominal)}              # m",
             f"reach = {{ center = {_row(box.center)}, half_size = {_row(box.half_size)} }}   # m",
+            "[feet.leg]",
+            f"hip = {_row(hip, 4)}                  # m",
+            f"lateral = {leg.lateral:.4f}                            # m",
+            f"thigh = {leg.thigh:.4f}                              # m",
+            f"shank = {leg.shank:.4f}                              # m",
+            f"bend = {leg.bend:.1f}                                  # the knee bends the shank forward (1) or back (-1)",
+            f"foot_radius = {robot.radius:g}                         # m",
+            f"speed_limit = {robot.speed_limit:.1f}                           # rad/s, each joint",
+            f"torque_limit = {_row(torque, 1)}           # N m, HAA, HFE, KFE",
         ]
     return "\n".join(lines) + "\n"
 

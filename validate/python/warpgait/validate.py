@@ -10,6 +10,7 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,6 +56,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--no-pictures", action="store_true", help="no pictures in the report")
     parser.add_argument("--video", action="store_true", help="write NAME.mp4 as well")
     parser.add_argument("--json", action="store_true", help="print the report as JSON and nothing else")
+    parser.add_argument("--no-files", action="store_true", help="write nothing, only print the verdict")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error")
     wrong = parser.add_argument_group("a world that differs from the plan's")
     wrong.add_argument("--friction", type=float, help="of the ground (default: the plan's)")
@@ -92,7 +94,7 @@ def _refuse_nonsense(options: argparse.Namespace) -> None:
 
 def _run(options: argparse.Namespace, folder: Path) -> int:
     try:
-        from . import film, page, plan, report, scene, validation
+        from . import plan, report, scene, validation
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco==3.17.0 daqp numpy scipy") from error
 
@@ -114,6 +116,21 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
     settings = validation.Settings(options.model, options.rate, not options.no_second_opinion, not options.no_raw, disturbance)
     found = validation.validate(loaded, settings, say)
 
+    if not options.no_files:
+        _write(options, folder, found, say)
+    if options.json:
+        print(json.dumps(report.as_dict(found), allow_nan=False))
+    else:
+        _summary(found)
+        if not options.no_files:
+            print(f"{folder / _stem(options.plan)}.report.html")
+    return 0 if report.trackable(found) else 1
+
+
+def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Callable[[str], None]) -> None:
+    """The report, the replay, and pictures and film as asked for."""
+    from . import film, page, report
+
     folder.mkdir(parents=True, exist_ok=True)
     stem = _stem(options.plan)
     pictures: list[tuple[float, bytes]] = []
@@ -131,13 +148,6 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
     report.write_json(found, folder / f"{stem}.report.json")
     page.write_html(found, folder / f"{stem}.report.html", pictures, note)
     report.write_replay(found, folder / f"{stem}.replay.npz")
-
-    if options.json:
-        print(json.dumps(report.as_dict(found), allow_nan=False))
-    else:
-        _summary(found)
-        print(f"{folder / stem}.report.html")
-    return 0 if report.trackable(found) else 1
 
 
 def _summary(found: Validation) -> None:
@@ -166,7 +176,7 @@ def main(words: list[str] | None = None) -> int:
         return _run(options, folder)
     except (InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
-        if options.plan.is_file() and folder.is_dir():
+        if not options.no_files and options.plan.is_file() and folder.is_dir():
             _report_error(folder / f"{_stem(options.plan)}.report.json", options.plan.name, str(error))
         return 2
     except KeyboardInterrupt:

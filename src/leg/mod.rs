@@ -1,0 +1,228 @@
+//! A leg with hip abduction (HAA, about x), hip flexion (HFE) and knee flexion (KFE, both about y once abducted).
+//!
+//! ```text
+//!   d = r − hip + (0, 0, foot_radius)         foot's centre from the hip, base frame
+//!   h = √(d_y² + d_z² − l²)                   how far it hangs below the HAA axis in the plane of the leg
+//!   cos κ = (d_x² + h² − a² − b²)/(2ab)       κ: angle of the knee, 0 stretched
+//!   d_x = a sin φ + b sin(φ + κ),  h = a cos φ + b cos(φ + κ)      φ: thigh from straight down, towards +x
+//! ```
+//!
+//! with l, a, b the lateral offset, thigh and shank, and r the contact point. The foot's centre is taken one radius above it along the
+//! base's own z; along the ground's normal it would be, which differs by the radius times the angle between the two.
+//!
+//! Out of reach, roots are rounded off so that everything stays smooth: an iterate may be anywhere.
+
+pub mod jet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use jet::Scalar;
+
+/// Rounding of sin²κ; at κ = 0.35, the least that reach boxes allow, it moves sin κ by 0.02 %.
+const SINE_ROUNDING: f64 = 5e-3;
+/// Rounding of h², m².
+const DROP_ROUNDING: f64 = 1e-4;
+
+/// Geometry and motors of a leg. Lengths in m, base frame, origin at the centre of mass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Leg {
+    /// x of the HFE axis, y and z of the HAA axis.
+    pub hip: [f64; 3],
+    /// How far the foot's centre lies beside (+y) the HAA axis.
+    pub lateral: f64,
+    /// HFE to KFE in the plane of the leg.
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub thigh: f64,
+    /// KFE to the foot's centre in the plane of the leg.
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub shank: f64,
+    /// +1 where the shank points further forward than the thigh, −1 where it points further back.
+    pub bend: f64,
+    /// Of the foot.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub foot_radius: f64,
+    /// Greatest speed of each joint, rad/s.
+    #[schemars(range(min = 0.01, max = 1000.0))]
+    pub speed_limit: f64,
+    /// Greatest torque of HAA, HFE and KFE, N m.
+    #[schemars(inner(range(min = 0.01, max = 1e6)))]
+    pub torque_limit: [f64; 3],
+}
+
+/// Where the parts of a leg are for a contact point, base frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Posture<T> {
+    /// sin and cos of the abduction.
+    abduction: [T; 2],
+    /// The foot's centre in the plane of the leg from the HFE axis: forward, down.
+    foot: [T; 2],
+    /// The knee, likewise.
+    knee: [T; 2],
+    /// sin φ, cos φ.
+    thigh: [T; 2],
+    /// sin κ, cos κ.
+    bent: [T; 2],
+    lateral: f64,
+    radius: f64,
+    hip: [f64; 3],
+}
+
+/// A smooth positive stand-in for the root of u, which may be negative.
+fn rounded_root<T: Scalar>(u: T, rounding: f64) -> T {
+    ((u + (u * u + rounding * rounding).sqrt()) * 0.5).sqrt()
+}
+
+impl Leg {
+    /// Whether there are joint angles for the contact point at r, limits aside.
+    pub fn reaches(&self, r: [f64; 3]) -> bool {
+        let [x, y, z] =
+            std::array::from_fn(|c| r[c] - self.hip[c] + if c == 2 { self.foot_radius } else { 0.0 });
+        let drop = y * y + z * z - self.lateral * self.lateral;
+        let distance = (x * x + drop).sqrt();
+        drop > 0.0 && distance < self.thigh + self.shank && distance > (self.thigh - self.shank).abs()
+    }
+
+    /// The posture with the contact point at r, base frame from the centre of mass.
+    pub fn posture<T: Scalar>(&self, r: [T; 3]) -> Posture<T> {
+        let (a, b, l) = (self.thigh, self.shank, self.lateral);
+        let x = r[0] + -self.hip[0];
+        let y = r[1] + -self.hip[1];
+        let z = r[2] + (self.foot_radius - self.hip[2]);
+        let h = rounded_root(y * y + z * z + -l * l, DROP_ROUNDING);
+        // (y, z) = (l cos α + h sin α, l sin α − h cos α).
+        let scale = (h * h + l * l).recip();
+        let abduction = [(h * y + z * l) * scale, (y * l - h * z) * scale];
+        let cos = (x * x + h * h + (-a * a - b * b)) * (0.5 / (a * b));
+        let sin = rounded_root(-(cos * cos) + 1.0, SINE_ROUNDING) * self.bend;
+        // x = A sin φ + B cos φ, h = A cos φ − B sin φ.
+        let (along, across) = (cos * b + a, sin * b);
+        let scale = (along * along + across * across).recip();
+        let thigh = [(along * x - across * h) * scale, (along * h + across * x) * scale];
+        Posture {
+            abduction,
+            foot: [x, h],
+            knee: thigh.map(|c| c * a),
+            thigh,
+            bent: [sin, cos],
+            lateral: l,
+            radius: self.foot_radius,
+            hip: self.hip,
+        }
+    }
+}
+
+impl<T: Scalar> Posture<T> {
+    /// The angles φ and κ, which HFE and KFE turn as fast as, rad.
+    pub fn angles(&self) -> [T; 2] {
+        [self.thigh[0].atan2(self.thigh[1]), self.bent[0].atan2(self.bent[1])]
+    }
+
+    /// A vector in the plane of the leg, forward and down, in the base frame.
+    fn in_base(&self, [forward, down]: [T; 2]) -> [T; 3] {
+        let [sin, cos] = self.abduction;
+        [forward, down * sin, -(down * cos)]
+    }
+
+    /// The knee, base frame from the centre of mass, m; beside the thigh by as much as the foot is.
+    pub fn knee(&self) -> [T; 3] {
+        let [x, y, z] = self.in_base(self.knee);
+        let [sin, cos] = self.abduction;
+        let l = self.lateral;
+        [x + self.hip[0], y + cos * l + self.hip[1], z + sin * l + self.hip[2]]
+    }
+
+    /// How fast the contact point moves in the base frame with HAA, HFE and KFE, m: ∂r/∂q, by joint. A force f of the ground at the
+    /// contact point, base frame, needs the torques −(∂r/∂q)ᵀ f of a leg without mass.
+    pub fn jacobian(&self) -> [[T; 3]; 3] {
+        let [sin, cos] = self.abduction;
+        let [x, h] = self.foot;
+        let (l, radius) = (self.lateral, self.radius);
+        // The contact point seen from the HAA axis; the radius is along the base's z.
+        let y = cos * l + h * sin;
+        let z = sin * l - h * cos + -radius;
+        let zero = y * 0.0;
+        // axis × (v − radius ẑ) with axis = (0, cos α, sin α).
+        let about = |v: [T; 2]| {
+            let [_, up_y, up_z] = self.in_base([zero, v[0]]);
+            [-v[1] - cos * radius, up_y, up_z]
+        };
+        let [knee_x, knee_h] = self.knee;
+        [[zero, -z, y], about([x, h]), about([x - knee_x, h - knee_h])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Rotation3, Vector3};
+
+    use super::*;
+
+    const LEG: Leg = Leg {
+        hip: [0.3, -0.1, 0.05],
+        lateral: -0.2,
+        thigh: 0.28,
+        shank: 0.33,
+        bend: -1.0,
+        foot_radius: 0.03,
+        speed_limit: 10.0,
+        torque_limit: [40.0; 3],
+    };
+
+    /// The foot's centre and the knee by turning one joint after the other: q = HAA, thigh from straight down, knee.
+    fn forward(leg: &Leg, q: [f64; 3]) -> (Vector3<f64>, Vector3<f64>) {
+        let turn = |angle: f64| Rotation3::from_axis_angle(&Vector3::y_axis(), -angle);
+        let haa = Rotation3::from_axis_angle(&Vector3::x_axis(), q[0]);
+        let side = Vector3::y() * leg.lateral;
+        let knee = turn(q[1]) * (Vector3::z() * -leg.thigh);
+        let foot = knee + turn(q[1] + q[2]) * (Vector3::z() * -leg.shank);
+        let hip = Vector3::from(leg.hip);
+        (hip + haa * (side + foot), hip + haa * (side + knee))
+    }
+
+    #[test]
+    fn postures_undo_forward_kinematics() {
+        for bend in [1.0, -1.0] {
+            let leg = Leg { bend, ..LEG };
+            for q in [[0.2, 0.6, 1.2], [-0.4, 0.3, 0.5], [0.1, 0.7, 1.9], [0.0, 0.9, 2.3]] {
+                let q = [q[0], -bend * q[1], bend * q[2]];
+                let (center, knee) = forward(&leg, q);
+                let below = -Vector3::z() * leg.foot_radius;
+                let contact = center + below;
+                assert!(leg.reaches(contact.into()));
+                let found = leg.posture::<f64>(contact.into());
+                let [thigh, bent] = found.angles();
+                assert!(
+                    (thigh - q[1]).abs() < 1e-3 && (bent - q[2]).abs() < 1e-3,
+                    "{thigh} {bent} for {q:?}"
+                );
+                assert!((Vector3::from(found.knee()) - knee).norm() < 1e-3);
+                // HFE and KFE turn against the angles from straight down; the contact point turns with the foot.
+                let axis = Rotation3::from_axis_angle(&Vector3::x_axis(), q[0]) * Vector3::y();
+                let step = 1e-6;
+                for (j, column) in found.jacobian().into_iter().enumerate() {
+                    let moved = |sign: f64| {
+                        let mut q = q;
+                        q[j] += sign * step;
+                        forward(&leg, q).0
+                    };
+                    let sign = if j == 0 { 1.0 } else { -1.0 };
+                    let center = (moved(1.0) - moved(-1.0)) * (sign / (2.0 * step));
+                    let expected = center + if j == 0 { Vector3::x() } else { axis }.cross(&below);
+                    assert!((Vector3::from(column) - expected).norm() < 1e-3, "joint {j} at {q:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn out_of_reach_everything_is_finite() {
+        for r in [[0.3, -0.1, -2.0], [0.3, -0.1, 0.02], [0.3, -0.3, 0.02], [2.0, 1.0, 1.0]] {
+            assert!(!LEG.reaches(r));
+            let found = LEG.posture::<f64>(r);
+            let numbers = found.angles().into_iter().chain(found.knee()).chain(found.jacobian().concat());
+            assert!(numbers.into_iter().all(f64::is_finite));
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! The way to the Python package that replays plans on the full robot (`validate/`): where it is, and what its report says.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// Exits with 0 when Python finds the package; does not import it, which would take a second.
+const HAS_PACKAGE: &str =
+    "import importlib.util, sys; sys.exit(importlib.util.find_spec('warpgait') is None)";
+
+/// A Python that has the package: of the `.venv` of the working folder, those above the program, or `python3`.
+///
+/// # Errors
+/// When none has it; the message says how to install it.
+pub fn python() -> Result<PathBuf> {
+    candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
+        Error::input(
+            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it: \
+             python3 -m venv .venv && .venv/bin/pip install ./validate",
+        )
+    })
+}
+
+fn candidates() -> Vec<PathBuf> {
+    let mut folders = vec![PathBuf::from(".")];
+    if let Ok(program) = std::env::current_exe() {
+        folders.extend(program.ancestors().skip(1).take(4).map(Path::to_path_buf));
+    }
+    let mut pythons: Vec<PathBuf> = folders.iter().map(|folder| folder.join(".venv/bin/python")).collect();
+    pythons.retain(|python| python.exists());
+    pythons.push("python3".into());
+    pythons
+}
+
+fn has_package(python: &Path) -> bool {
+    let mut command = Command::new(python);
+    command.args(["-c", HAS_PACKAGE]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+/// What became of a metric, or of a whole replay. Ordered, the worst last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Within the limit for a pass.
+    Pass,
+    /// Within the wider one.
+    Marginal,
+    /// Beyond.
+    Fail,
+}
+
+impl Verdict {
+    /// As reports write it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Pass => "pass",
+            Verdict::Marginal => "marginal",
+            Verdict::Fail => "fail",
+        }
+    }
+}
+
+/// A line of the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metric {
+    /// Open loop, or the replay it is of.
+    #[serde(default)]
+    pub layer: String,
+    /// What is measured.
+    pub name: String,
+    /// None where it is no number.
+    pub value: Option<f64>,
+    /// Of the value.
+    pub unit: String,
+    /// Limit for a pass.
+    pub pass: f64,
+    /// Limit for marginal.
+    pub marginal: f64,
+    /// Of this metric.
+    pub verdict: Verdict,
+}
+
+/// What went wrong first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Incident {
+    /// s.
+    pub time: f64,
+    /// Of which foot.
+    pub foot: Option<String>,
+    /// In words.
+    pub what: String,
+}
+
+/// The report of a replay, as far as benches look at it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tracked {
+    /// The worst of all metrics.
+    pub verdict: Verdict,
+    /// Of a plan that does not pass.
+    pub first_failure: Option<Incident>,
+    /// Those of the open loop and of every replay that counts, in the order of the report.
+    pub metrics: Vec<Metric>,
+    /// Wall time of the validation, without starting Python, s.
+    pub seconds: f64,
+}
+
+/// `NAME.report.json`.
+#[derive(Deserialize)]
+struct Report {
+    verdict: Verdict,
+    first_failure: Option<Incident>,
+    open_loop: Layer,
+    replays: Vec<Layer>,
+    seconds: f64,
+}
+
+#[derive(Deserialize)]
+struct Layer {
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default)]
+    counts: Option<bool>,
+    metrics: Vec<Metric>,
+}
+
+impl Tracked {
+    /// From the text of a report; what is wrong with it otherwise.
+    pub fn read(report: &[u8]) -> std::result::Result<Self, String> {
+        let report: Report =
+            serde_json::from_slice(report).map_err(|e| format!("report of the replay: {e}"))?;
+        let layers = std::iter::once(report.open_loop).chain(report.replays);
+        let metrics = layers.filter(|layer| layer.counts != Some(false)).flat_map(|layer| {
+            let name = layer.name.unwrap_or_else(|| "open loop".into());
+            layer.metrics.into_iter().map(move |metric| Metric { layer: name.clone(), ..metric })
+        });
+        Ok(Self {
+            verdict: report.verdict,
+            first_failure: report.first_failure,
+            metrics: metrics.collect(),
+            seconds: report.seconds,
+        })
+    }
+
+    /// The first metric of the report that decides the verdict; none for a pass.
+    pub fn first_failing(&self) -> Option<&Metric> {
+        let decides = |metric: &&Metric| metric.verdict == self.verdict;
+        if self.verdict == Verdict::Pass { None } else { self.metrics.iter().find(decides) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_is_read_with_the_metric_that_decides() {
+        let metric = |name: &str, verdict: &str| {
+            format!(
+                r#"{{"name": "{name}", "value": 1.5, "unit": "mm", "limit": "at most", "pass": 1, "marginal": 2, "verdict": "{verdict}"}}"#
+            )
+        };
+        let text = format!(
+            r#"{{"schema": 1, "verdict": "fail", "trackable": false, "seconds": 3.5,
+                "first_failure": {{"time": 2.5, "foot": null, "what": "fall"}},
+                "open_loop": {{"metrics": [{}], "incidents": []}},
+                "replays": [{{"name": "closed loop", "counts": true, "verdict": "fail", "metrics": [{}, {}]}},
+                            {{"name": "second opinion", "counts": false, "verdict": "fail", "metrics": [{}]}}]}}"#,
+            metric("peak joint speed", "marginal"),
+            metric("feet", "pass"),
+            metric("slip", "fail"),
+            metric("fall", "fail"),
+        );
+        let found = Tracked::read(text.as_bytes()).unwrap();
+        assert_eq!(found.verdict, Verdict::Fail);
+        assert_eq!(found.metrics.len(), 3);
+        let first = found.first_failing().unwrap();
+        assert_eq!((first.layer.as_str(), first.name.as_str()), ("closed loop", "slip"));
+        assert!(Tracked::read(b"{}").unwrap_err().contains("report of the replay"));
+    }
+}

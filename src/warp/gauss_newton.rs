@@ -1,0 +1,131 @@
+//! Gauss–Newton with a line search that stays where space is not folded.
+//!
+//! The linear systems are solved by conjugate gradients with the tensor-product preconditioner. A sparse factorization is no
+//! match for that: tri-cubic splines couple each coefficient with 343 others in each of three components, and the factor fills.
+
+use std::ops::ControlFlow;
+
+use super::barrier::{Barrier, Curvature};
+use super::lanes::Lanes;
+use super::lbfgs::{Limits, Objective, Outcome, dot};
+use super::problem::Problem;
+
+/// Conjugate gradients by iteration, at most.
+const MAX_INNER: usize = 40;
+/// A step that had to be cut asks for damping: the matrix does not see rotations, and long ones fold space. Least and greatest, and
+/// by how much it changes.
+const DAMPING: [f64; 2] = [0.03, 10.0];
+const DAMPING_FACTOR: f64 = 4.0;
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+const MAX_BACKTRACKS: usize = 30;
+
+/// Minimizes from u, which must not be folded. `progress` sees the iteration, the energy and gᵀd, d the step.
+pub(super) fn gauss_newton(
+    problem: &mut Problem<'_, Barrier>,
+    u: &mut Vec<f64>,
+    limits: Limits,
+    progress: &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
+) -> Outcome {
+    let mut gradient = vec![0.0; u.len()];
+    let mut value = problem.evaluate(u, &mut gradient);
+    let mut outcome = Outcome { evaluations: 1, value, ..Outcome::default() };
+    if !value.is_finite() {
+        return outcome;
+    }
+    let mut trial = u.clone();
+    let mut trial_gradient = gradient.clone();
+    let mut damping = 0.0;
+    loop {
+        let step = step(problem, u, &gradient, damping);
+        let decrement = dot(&step, &gradient);
+        (outcome.value, outcome.decrement) = (value, decrement);
+        if progress(outcome.iterations, value, decrement).is_break() {
+            outcome.interrupted = true;
+            return outcome;
+        }
+        if decrement <= limits.tolerance * (value.abs() + limits.floor) {
+            outcome.converged = true;
+            return outcome;
+        }
+        if outcome.iterations >= limits.iterations {
+            return outcome;
+        }
+        let mut scale = 1.0;
+        let mut accepted = None;
+        for _ in 0..MAX_BACKTRACKS {
+            for ((t, u), d) in trial.iter_mut().zip(u.iter()).zip(&step) {
+                *t = u - scale * d;
+            }
+            let next = problem.evaluate(&mut trial, &mut trial_gradient);
+            outcome.evaluations += 1;
+            // An infinite value, that is, a fold, fails this.
+            if next <= value - SUFFICIENT_DECREASE * scale * decrement {
+                accepted = Some(next);
+                break;
+            }
+            scale *= 0.5;
+        }
+        let Some(next) = accepted else { return outcome };
+        damping = match scale < 1.0 {
+            true => (DAMPING_FACTOR * damping).clamp(DAMPING[0], DAMPING[1]),
+            false if damping > DAMPING[0] => damping / DAMPING_FACTOR,
+            false => 0.0,
+        };
+        std::mem::swap(u, &mut trial);
+        std::mem::swap(&mut gradient, &mut trial_gradient);
+        value = next;
+        outcome.iterations += 1;
+    }
+}
+
+/// (H + damping K)⁻¹ g, K the stiffness of ½‖∇u‖², to a residual that falls with the gradient, by preconditioned conjugate gradients.
+fn step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
+    let times = |curvature: &Curvature, change: &[Lanes; 9]| {
+        let mut out = curvature.times(change);
+        for (o, c) in out.iter_mut().zip(change) {
+            *o += damping * *c;
+        }
+        out
+    };
+    let linearized = problem.linearized(u, |density, jacobian| density.curvature(jacobian));
+    let mut step = vec![0.0; gradient.len()];
+    let mut rest = gradient.to_vec();
+    let mut conditioned = rest.clone();
+    problem.precondition(&mut conditioned);
+    let mut direction = conditioned.clone();
+    let mut product = vec![0.0; gradient.len()];
+    let first = dot(&rest, &conditioned);
+    let mut square = first;
+    for _ in 0..MAX_INNER {
+        problem.curved(&linearized, times, &mut direction, &mut product);
+        let curvature = dot(&direction, &product);
+        if curvature <= 0.0 {
+            break;
+        }
+        let length = square / curvature;
+        add(&mut step, length, &direction);
+        add(&mut rest, -length, &product);
+        conditioned.copy_from_slice(&rest);
+        problem.precondition(&mut conditioned);
+        let next = dot(&rest, &conditioned);
+        if next <= FORCING * FORCING * first {
+            break;
+        }
+        let ratio = next / square;
+        square = next;
+        for (d, c) in direction.iter_mut().zip(&conditioned) {
+            *d = c + ratio * *d;
+        }
+    }
+    step
+}
+
+/// The residual of a linear system, in the preconditioner's norm, relative to the gradient.
+const FORCING: f64 = 0.1;
+
+/// a += factor · b.
+fn add(a: &mut [f64], factor: f64, b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += factor * b;
+    }
+}
