@@ -13,13 +13,13 @@ use crate::check::{CheckReport, check};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
 use crate::nlp::derivatives::{self, DerivativeError};
+use crate::nlp::model::gait;
 use crate::nlp::solve::{self as nlp, Motion};
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
 use crate::robot::Robot;
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
 use crate::terrain::{self, Ground, GroundReport};
-use crate::trajectory::Gait;
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
 use crate::{Error, Result};
 
@@ -82,7 +82,7 @@ pub fn run(
     phases_match(loaded, &robot)?;
     nlp::validate(scenario)?;
     // Refused now and not after the map.
-    Gait::new(scenario, &robot.feet.iter().map(|foot| foot.name.clone()).collect::<Vec<_>>())?;
+    gait(scenario, &robot)?;
 
     // Whoever wishes to stop is asked again at the first iteration.
     let _ = observer(&Event::Stage("terrain"));

@@ -57,6 +57,10 @@ pub struct Robot {
     pub mass: f64,
     /// Inertia about the centre of mass in the base frame at the nominal stance, kg m².
     pub inertia: [[f64; 3]; 3],
+    /// Length of a gait's cycle where the scenario names none, s; 1 s if the robot's file names none either.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.1, max = 20.0))]
+    pub gait_cycle: Option<f64>,
     /// The torso's box, for clearance over the ground.
     pub torso: Box3,
     /// The feet, in the order of the plan's `foot_names`.

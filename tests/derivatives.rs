@@ -174,7 +174,7 @@ fn blocks_of_known_legs_match_differences() {
     for formulation in ["warped", "direct"] {
         for robot in ["anymal_b", "anymal_c"] {
             let problem = problem_of(robot, TERRAINS[0].1, formulation, "");
-            for name in ["joint speed", "joint torque"] {
+            for name in ["joint speed", "joint torque", "knee clearance"] {
                 assert!(
                     problem.blocks().any(|(block, _)| block.name() == name && block.rows() > 0),
                     "{name}"

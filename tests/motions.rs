@@ -108,7 +108,7 @@ fn a_standing_robot_has_constant_forces_and_does_not_move() {
     for formulation in ["warped", "direct"] {
         let text = format!(
             "formulation = \"{formulation}\"\nhorizon = 2.0\n[gait]\nkind = \"stand\"\n[terrain]\nkind = \"rippled\"\n\
-             [start]\nposition = [0.1, 0.3]\nyaw = 0.4\n[goal]\nposition = [0.1, 0.3]\n[solver]\neffort = \"optimal\"\n"
+             [start]\nposition = [0.1, 0.3]\nyaw = 0.4\n[goal]\nposition = [0.1, 0.3]\n[solver]\neffort = \"optimal\"\ntolerance = 1e-6\n"
         );
         let (motion, plan, report) = run(&text);
         assert!(motion.solved, "{formulation}: {}", motion.status);

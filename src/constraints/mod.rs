@@ -11,6 +11,7 @@ pub mod friction_conformal;
 pub mod goal;
 pub mod joint_speed;
 pub mod joint_torque;
+pub mod knee_clearance;
 pub mod newton_euler;
 pub mod normal_force;
 pub mod reach;

@@ -38,6 +38,11 @@ pub struct Leg {
     /// KFE to the foot's centre in the plane of the leg.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub shank: f64,
+    /// Of the parts around the KFE axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub knee_radius: f64,
+    /// The shank's outermost corner seen from the KFE axis: along the line to the foot's centre, and across it, away from the inside of the bend.
+    pub corner: [f64; 2],
     /// +1 where the shank points further forward than the thigh, −1 where it points further back.
     pub bend: f64,
     /// Of the foot.
@@ -65,6 +70,8 @@ pub struct Posture<T> {
     /// sin κ, cos κ.
     bent: [T; 2],
     lateral: f64,
+    shank: f64,
+    bend: f64,
     radius: f64,
     hip: [f64; 3],
 }
@@ -107,6 +114,8 @@ impl Leg {
             thigh,
             bent: [sin, cos],
             lateral: l,
+            shank: b,
+            bend: self.bend,
             radius: self.foot_radius,
             hip: self.hip,
         }
@@ -125,9 +134,20 @@ impl<T: Scalar> Posture<T> {
         [forward, down * sin, -(down * cos)]
     }
 
-    /// The knee, base frame from the centre of mass, m; beside the thigh by as much as the foot is.
+    /// The knee, base frame from the centre of mass, m; as far beside the HAA axis as the foot is.
     pub fn knee(&self) -> [T; 3] {
-        let [x, y, z] = self.in_base(self.knee);
+        self.on_shank([0.0, 0.0])
+    }
+
+    /// A point of the shank, base frame from the centre of mass, m: `along` the line from knee to foot, and across it.
+    pub fn on_shank(&self, [along, across]: [f64; 2]) -> [T; 3] {
+        let [forward, down] = [0, 1].map(|c| (self.foot[c] - self.knee[c]) * (1.0 / self.shank));
+        let across = across * self.bend;
+        let point = [
+            self.knee[0] + forward * along + down * across,
+            self.knee[1] + down * along + -(forward * across),
+        ];
+        let [x, y, z] = self.in_base(point);
         let [sin, cos] = self.abduction;
         let l = self.lateral;
         [x + self.hip[0], y + cos * l + self.hip[1], z + sin * l + self.hip[2]]
@@ -164,6 +184,8 @@ mod tests {
         lateral: -0.2,
         thigh: 0.28,
         shank: 0.33,
+        knee_radius: 0.06,
+        corner: [0.06, 0.1],
         bend: -1.0,
         foot_radius: 0.03,
         speed_limit: 10.0,
@@ -214,6 +236,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn points_of_the_shank_keep_their_distances() {
+        let (contact, knee) = forward(&LEG, [0.2, 0.5, -1.2]);
+        let contact = contact - Vector3::z() * LEG.foot_radius;
+        let at = |point: [f64; 2]| Vector3::from(LEG.posture::<f64>(contact.into()).on_shank(point));
+        assert!((at([LEG.shank, 0.0]) - (contact + Vector3::z() * LEG.foot_radius)).norm() < 1e-3);
+        let corner = at(LEG.corner);
+        assert!(((corner - knee).norm() - LEG.corner[0].hypot(LEG.corner[1])).abs() < 1e-3);
+        // The knee of this leg points forward, its shank back and down: the outside is behind the line.
+        assert!(corner.x < at([LEG.corner[0], 0.0]).x);
     }
 
     #[test]

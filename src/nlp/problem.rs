@@ -10,6 +10,7 @@ use crate::constraints::friction_conformal::FrictionConformal;
 use crate::constraints::goal::Goal;
 use crate::constraints::joint_speed::JointSpeed;
 use crate::constraints::joint_torque::JointTorque;
+use crate::constraints::knee_clearance::KneeClearance;
 use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
@@ -97,6 +98,7 @@ impl Problem {
         if model.legs.iter().any(Option::is_some) {
             blocks.push(Box::new(JointSpeed::new(&model)));
             blocks.push(Box::new(JointTorque::new(&model)));
+            blocks.push(Box::new(KneeClearance::new(&model)));
         }
         if model.layout.has_switches() {
             blocks.push(Box::new(Durations::new(&model, scenario.gait.duration_bounds)));

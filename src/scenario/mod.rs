@@ -243,9 +243,9 @@ pub enum GaitKind {
 pub struct GaitSpec {
     /// Which pattern.
     pub kind: GaitKind,
-    /// Length of a cycle, s.
+    /// Length of a cycle, s; default: the robot's (anymal_c 1.2), else 1.
     #[schemars(range(min = 0.1, max = 20.0))]
-    pub cycle: f64,
+    pub cycle: Option<f64>,
     /// Share of the cycle that a foot stands; default by kind: walk 0.75, others 0.6.
     #[schemars(range(min = 0.1, max = 1.0))]
     pub duty: Option<f64>,
@@ -263,7 +263,7 @@ impl Default for GaitSpec {
     fn default() -> Self {
         Self {
             kind: GaitKind::Walk,
-            cycle: 1.0,
+            cycle: None,
             duty: None,
             optimize_durations: false,
             duration_bounds: [0.1, 1.0],

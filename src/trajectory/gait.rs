@@ -61,8 +61,9 @@ pub struct Gait {
 }
 
 impl Gait {
-    /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom).
-    pub fn new(scenario: &Scenario, foot_names: &[String]) -> Result<Self> {
+    /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom); `cycle` is the
+    /// length of a cycle, s, where the scenario names none.
+    pub fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
         let step = scenario.time_step;
         let intervals = (scenario.horizon / step).round() as usize;
         let gait = &scenario.gait;
@@ -73,7 +74,7 @@ impl Gait {
             kind => {
                 let (offsets, duty) = pattern(kind, foot_names)?;
                 let duty = gait.duty.unwrap_or(duty);
-                cyclic(&offsets, duty, gait.cycle, scenario.horizon, step)?
+                cyclic(&offsets, duty, gait.cycle.unwrap_or(cycle), scenario.horizon, step)?
             }
         };
         if gait.optimize_durations {
@@ -220,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_walk_lifts_one_foot_at_a_time_and_stands_at_both_ends() {
-        let gait = Gait::new(&scenario(""), &names()).expect("a gait");
+        let gait = Gait::new(&scenario(""), &names(), 1.0).expect("a gait");
         assert_eq!(gait.intervals, 200);
         for k in 0..=200 {
             let up = (0..4).filter(|&f| gait.swing_at(f, k).is_some()).count();
@@ -234,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_trot_moves_diagonal_pairs_together() {
-        let gait = Gait::new(&scenario("[gait]\nkind = \"trot\"\ncycle = 0.8\nduty = 0.5"), &names())
+        let gait = Gait::new(&scenario("[gait]\nkind = \"trot\"\ncycle = 0.8\nduty = 0.5"), &names(), 1.0)
             .expect("a gait");
         assert_eq!(gait.swings[0], gait.swings[3]);
         assert_eq!(gait.swings[1], gait.swings[2]);
@@ -244,10 +245,10 @@ mod tests {
     #[test]
     fn a_custom_table_must_fill_the_horizon() {
         let ok = "[gait]\nkind = \"custom\"\nphases = [[5.0, 0.5, 4.5], [10.0], [10.0], [10.0]]";
-        let gait = Gait::new(&scenario(ok), &names()).expect("a gait");
+        let gait = Gait::new(&scenario(ok), &names(), 1.0).expect("a gait");
         assert_eq!(gait.swings[0], [Swing::given(100.0, 110.0)]);
         assert_eq!(gait.stances(0), [Stance { start: 0.0, end: 100.0 }, Stance { start: 110.0, end: 200.0 }]);
         let short = ok.replace("4.5", "4.0");
-        assert!(Gait::new(&scenario(&short), &names()).unwrap_err().to_string().contains("horizon"));
+        assert!(Gait::new(&scenario(&short), &names(), 1.0).unwrap_err().to_string().contains("horizon"));
     }
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +35,43 @@ class CentroidalRobot:
     feet: tuple[str, ...]
     nominal: Array  # (E, 3) contact points
     reach: tuple[Box, ...]
+    shank: ShankShape
     legs: tuple[Leg, ...]  # hips relative to the base's origin, as the model has them
     radius: float  # m, of the feet
     speed_limit: float  # rad/s
+    gait_cycle: float | None  # s, where the model names one
     torque_limit: Array  # (E, 3) N m
+
+
+@dataclass(frozen=True)
+class ShankShape:
+    """What of a shank could hit the ground, in the plane of the leg, m."""
+
+    knee_radius: float  # of the parts around the KFE axis
+    corner: tuple[float, float]  # the outermost corner from there: along the line to the foot's centre, and across it
+
+
+def shank_shape(model: Any, leg: Leg) -> ShankShape:
+    """Read off the collision shapes of the body that carries the foot of `leg`."""
+    body = model.geom_bodyid[model.geom(leg.name).id]
+    radius, corner = 0.0, (0.0, 0.0)
+    foot = np.array([np.sin(leg.shank_zero), -np.cos(leg.shank_zero)])  # from the knee, x and z at zero joint angles
+    outward = leg.bend * np.array([-foot[1], foot[0]])
+    for g in np.flatnonzero(model.geom_bodyid == body):
+        if g == model.geom(leg.name).id:
+            continue
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[g])
+        R = rotation.reshape(3, 3)
+        center = model.geom_pos[g] + R @ model.geom_aabb[g, :3]
+        half = np.abs(R) @ model.geom_aabb[g, 3:]
+        corners = center[[0, 2]] + half[[0, 2]] * np.array(list(product([-1, 1], repeat=2)))
+        if (np.abs(center[[0, 2]]) <= half[[0, 2]]).all():  # around the axis: the far end belongs to the corner
+            radius = max(radius, float(half[2]))
+        furthest = corners[np.argmax(corners @ outward)]
+        if furthest @ outward > corner[1]:
+            corner = (float(furthest @ foot), float(furthest @ outward))
+    return ShankShape(radius, corner)
 
 
 def trunk_box(model: Any) -> Box:
@@ -81,6 +115,7 @@ def derive(path: Path, rules: ReachRules | None = None, resolution: float = 0.01
     base = data.xpos[index.base] + body.center_of_mass
     nominal = data.site_xpos[index.site] - np.array([0, 0, index.radius]) - base
     torso = Box(trunk.center - body.center_of_mass, trunk.half_size)
+    names = {model.numeric(i).name for i in range(model.nnumeric)}
     return CentroidalRobot(
         name=path.stem,
         body=body,
@@ -88,9 +123,11 @@ def derive(path: Path, rules: ReachRules | None = None, resolution: float = 0.01
         feet=feet,
         nominal=nominal,
         reach=tuple(boxes),
+        shank=shank_shape(model, all_legs[0]),
         legs=tuple(all_legs),
         radius=index.radius,
         speed_limit=index.speed_limit,
+        gait_cycle=float(model.numeric("gait_cycle").data[0]) if "gait_cycle" in names else None,
         torque_limit=index.torque_limit,
     )
 
@@ -112,6 +149,7 @@ def to_toml(robot: CentroidalRobot) -> str:
         "inertia = [                                    # kg m², about the centre of mass, nominal stance",
         *(f"  {_row(row, 6)}," for row in robot.body.inertia),
         "]",
+        *([] if robot.gait_cycle is None else [f"gait_cycle = {robot.gait_cycle:.2f}                              # s, default"]),
         "# The box around the trunk's collision shapes, m.",
         f"torso = {{ center = {_row(robot.torso.center)}, half_size = {_row(robot.torso.half_size)} }}",
         "",
@@ -136,6 +174,8 @@ def to_toml(robot: CentroidalRobot) -> str:
             f"lateral = {leg.lateral:.4f}                            # m",
             f"thigh = {leg.thigh:.4f}                              # m",
             f"shank = {leg.shank:.4f}                              # m",
+            f"knee_radius = {robot.shank.knee_radius:.4f}                        # m",
+            f"corner = {_row(np.array(robot.shank.corner), 4)}                  # m, of the shank, from the knee",
             f"bend = {leg.bend:.1f}                                  # the knee bends the shank forward (1) or back (-1)",
             f"foot_radius = {robot.radius:g}                         # m",
             f"speed_limit = {robot.speed_limit:.1f}                           # rad/s, each joint",

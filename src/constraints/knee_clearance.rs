@@ -1,0 +1,200 @@
+//! Knees and shanks stay clear of the ground, which on cliffs they are the first to hit.
+//!
+//! ```text
+//!   (zᵀq − h(q)) n_z ≥ radius + margin,  q = p + R v(r),  r = Rᵀ(p_i − p)
+//! ```
+//!
+//! v(r): a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]; the knee with its radius, and the shank's
+//! outermost corner. Legs of which the robot's file knows nothing have no rows.
+//!
+//! Rows: knee, corner for each foot at every `STRIDE`-th sample, m.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Constraint, Normal, Place, height_form, reach};
+use crate::heightfield::HeightJet;
+use crate::leg::Leg;
+use crate::leg::jet::{Jet, Scalar};
+use crate::nlp::sink::Sink;
+use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::{Model, State};
+use crate::trajectory::rotation::cross_matrix;
+
+/// Samples between two that are looked at.
+const STRIDE: usize = 2;
+/// For what happens between the samples, and the ground's curvature across the shank, m.
+const MARGIN: f64 = 0.02;
+
+/// Knees over the ground.
+#[derive(Clone, Debug)]
+pub struct KneeClearance {
+    places: Vec<(usize, usize, Leg)>,
+}
+
+impl KneeClearance {
+    /// Over the whole motion.
+    pub fn new(model: &Model) -> Self {
+        let mut places = Vec::new();
+        for (i, leg) in model.legs.iter().enumerate() {
+            if let Some(leg) = leg {
+                places.extend((0..=model.layout.intervals).step_by(STRIDE).map(|k| (i, k, *leg)));
+            }
+        }
+        Self { places }
+    }
+}
+
+/// The points v(r).
+fn points<T: Scalar>(leg: &Leg, r: [T; 3]) -> [[T; 3]; 2] {
+    let posture = leg.posture(r);
+    [posture.knee(), posture.on_shank(leg.corner)]
+}
+
+/// The distance of q to the tangent plane of the ground below it, its gradient and Hessian.
+fn distance(q: &Vector3<f64>, ground: &HeightJet) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let normal = Normal::new(ground);
+    let (gap, nz) = (q.z - ground.h, normal.n.z);
+    let by_gap = Vector3::new(-ground.d1[0], -ground.d1[1], 1.0);
+    let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
+    let form = by_gap * by_nz.transpose() + by_nz * by_gap.transpose() - height_form(ground) * nz
+        + normal.curvature(&Vector3::z()) * gap;
+    (gap * nz, by_gap * nz + by_nz * gap, form)
+}
+
+/// A point and how it moves: dq = by_turn δ + by_base dp + by_foot dp_i.
+struct Moved {
+    /// v in the base frame, with derivatives in r.
+    local: [Jet; 3],
+    /// The distance to the ground, and its derivatives in q.
+    distance: (f64, Vector3<f64>, Matrix3<f64>),
+    /// R ∂v/∂r Rᵀ.
+    with_foot: Matrix3<f64>,
+    /// \[p_i − p\].
+    arm: Matrix3<f64>,
+    by_turn: Matrix3<f64>,
+}
+
+impl Moved {
+    fn new(model: &Model, state: &State, (i, k): (usize, usize), local: [Jet; 3]) -> Self {
+        let base = &state.base[k];
+        let rotation = base.rotation();
+        let out = rotation * Vector3::from_fn(|c, _| local[c].value);
+        let q = base.position() + out;
+        let by_r = Matrix3::from_fn(|c, d| local[c].first[d]);
+        let with_foot = rotation * by_r * rotation.transpose();
+        let arm = cross_matrix(&(state.foot(model, i, k).point.position - base.position()));
+        Self {
+            local,
+            distance: distance(&q, &model.ground.jet(q.x, q.y)),
+            with_foot,
+            arm,
+            by_turn: with_foot * arm - cross_matrix(&out),
+        }
+    }
+
+    fn by_base(&self) -> Matrix3<f64> {
+        Matrix3::identity() - self.with_foot
+    }
+}
+
+impl KneeClearance {
+    fn moved(&self, model: &Model, state: &State, place: usize) -> [Moved; 2] {
+        let (i, k, leg) = &self.places[place];
+        let r = reach::value(model, state, (*i, *k));
+        points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *k), local))
+    }
+
+    fn tangents<'a>(&self, model: &'a Model, state: &'a State, place: usize) -> [Tangent<'a>; 3] {
+        let (i, k, _) = self.places[place];
+        let (base, foot, node) = (&state.base[k], state.foot(model, i, k), &model.layout.base[k]);
+        [
+            Tangent::turn(model, base, node),
+            Tangent::position(model, &base.point, node),
+            Tangent::position(model, &foot.point, state.foot_node(i, k)),
+        ]
+    }
+}
+
+impl Constraint for KneeClearance {
+    fn name(&self) -> &'static str {
+        "knee clearance"
+    }
+
+    fn rows(&self) -> usize {
+        2 * self.places.len()
+    }
+
+    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        for (rows, (_, _, leg)) in lower.chunks_exact_mut(2).zip(&self.places) {
+            rows.copy_from_slice(&[leg.knee_radius + MARGIN, MARGIN]);
+        }
+        upper.fill(f64::INFINITY);
+    }
+
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+        for (rows, (i, k, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
+            let (base, r) = (&state.base[*k], reach::value(model, state, (*i, *k)));
+            for (row, local) in rows.iter_mut().zip(points(leg, r.into())) {
+                let q = base.position() + base.rotation() * Vector3::from(local);
+                *row = distance(&q, &model.ground.jet(q.x, q.y)).0;
+            }
+        }
+    }
+
+    fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
+        for place in 0..self.places.len() {
+            let [turn, base, foot] = self.tangents(model, state, place);
+            for (j, moved) in self.moved(model, state, place).iter().enumerate() {
+                let (row, by_q) = (first + 2 * place + j, moved.distance.1);
+                turn.row(row, &moved.by_turn.tr_mul(&by_q), sink);
+                base.row(row, &moved.by_base().tr_mul(&by_q), sink);
+                foot.row(row, &moved.with_foot.tr_mul(&by_q), sink);
+            }
+        }
+    }
+
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        multipliers: &[f64],
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
+        for (place, lambda) in multipliers.chunks_exact(2).enumerate() {
+            let (i, k, _) = self.places[place];
+            let rotation = state.base[k].rotation();
+            let [turn, base, foot] = self.tangents(model, state, place);
+            for (moved, lambda) in self.moved(model, state, place).iter().zip(lambda) {
+                // The ground's curvature, and the normal's.
+                let form = moved.distance.2 * *lambda;
+                let (by_turn, by_base, by_foot) = (moved.by_turn, moved.by_base(), moved.with_foot);
+                turn.quadratic(&(by_turn.transpose() * form * by_turn), sink);
+                base.quadratic(&(by_base.transpose() * form * by_base), sink);
+                foot.quadratic(&(by_foot.transpose() * form * by_foot), sink);
+                turn.cross(&(by_turn.transpose() * form * by_base), &base, sink);
+                turn.cross(&(by_turn.transpose() * form * by_foot), &foot, sink);
+                base.cross(&(by_base.transpose() * form * by_foot), &foot, sink);
+                // w · d²q for q = p + R v(r): w · d²p, w · d²R v, w · dR dv, w · R d²v.
+                let w = moved.distance.1 * *lambda;
+                curvature.base_position[k] += w;
+                let v = Vector3::from_fn(|c, _| moved.local[c].value);
+                curvature.base_rotation[k] += w * v.transpose();
+                // (δ × R dv) · w = −δᵀ [w] (R dv), R dv = R ∂v/∂r Rᵀ ([arm] δ + dp_i − dp).
+                let mixed = -cross_matrix(&w) * moved.with_foot;
+                turn.cross(&(mixed * moved.arm), &turn, sink);
+                turn.cross(&mixed, &foot, sink);
+                turn.cross(&-mixed, &base, sink);
+                let u = rotation.tr_mul(&w);
+                let sum = moved.local[0] * u.x + moved.local[1] * u.y + moved.local[2] * u.z;
+                reach::say_quadratic(model, state, (i, k), &sum.second, sink);
+                reach::say_curvature(model, state, (i, k), &sum.first, curvature, sink);
+            }
+        }
+    }
+
+    fn place(&self, row: usize) -> Place {
+        let (i, k, _) = self.places[row / 2];
+        Place { foot: Some(i), sample: k as f64 }
+    }
+}
