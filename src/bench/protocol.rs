@@ -125,7 +125,7 @@ impl Bench {
                 .iter()
                 .filter(|&&name| options.robot.as_deref().is_none_or(|robot| robot == name));
             let of = |robot: &&str| {
-                let protocol = Protocol { options, robot: robot };
+                let protocol = Protocol { options, robot };
                 protocol.table(Work::Track, &TERRAINS, protocol.levels(&LEVELS[..2]))
             };
             return robots.flat_map(of).collect();
