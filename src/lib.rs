@@ -52,8 +52,10 @@
 //! | [`plan`] | the motion | samples at ten times the rate, exact splines and provenance in one `.npz` file |
 //! | [`check`] | a plan file alone | every law again, by other code, between the samples too |
 //! | [`report`] | plan, checks | tables and drawings |
+//! | [`leg`] | a contact point in the base frame | joint angles, knee, what a force asks of the motors |
 //! | [`pipeline`] | a scenario | all of the above in order |
 //! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
+//! | [`replay`] | a report of the Python package | its verdict |
 //! | [`cli`] | arguments | exit codes |
 //!
 //! # Notation

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,10 +87,21 @@ def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
     plan = load(ripple_plan)
     reference = sample(plan, 1.0 / plan.t[1], 0.03)
     assert np.allclose(reference.com, plan.base_position)
-    assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.foot_normal)
+    assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.center_direction)
     assert (reference.contact == plan.foot_contact).all()
     between = sample(plan, 500.0, 0.03)
     # The velocity it reports is that of the positions it reports, between the plan's samples too.
     moved = np.gradient(between.foot, between.t, axis=0)
     assert np.abs(moved - between.foot_velocity)[2:-2].max() < 0.02
     assert between.t[-1] == pytest.approx(plan.duration)
+
+
+def test_feet_do_not_follow_every_stone_that_they_pass(ripple_plan: Path) -> None:
+    plan = load(ripple_plan)
+    rng = np.random.default_rng(0)
+    shaken = np.where(plan.foot_contact[..., None], plan.foot_normal, rng.normal(size=plan.foot_normal.shape))
+    direction = replace(plan, foot_normal=shaken).center_direction
+    assert np.array_equal(direction[plan.foot_contact], plan.foot_normal[plan.foot_contact])
+    assert np.abs(np.linalg.norm(direction, axis=-1) - 1).max() < 1e-12
+    jump = np.abs(np.diff(direction, axis=0)).max()
+    assert (~plan.foot_contact).any() and jump < 0.05, jump

@@ -48,7 +48,7 @@ def postures(plan: Plan, model: Any, index: Indices, rolling: Rolling) -> Postur
     data = mujoco.MjData(model)
     N, E = plan.foot_contact.shape
     R = Rotation.from_quat(plan.base_quaternion_wxyz[:, [1, 2, 3, 0]]).as_matrix()
-    centers = plan.foot_position + index.radius * plan.foot_normal + rolling.offset
+    centers = plan.foot_position + index.radius * plan.center_direction + rolling.offset
     qpos = np.zeros((N, model.nq))
     qpos[:, 3:7] = plan.base_quaternion_wxyz
     unreachable, beyond = np.zeros((N, E), bool), np.zeros((N, E), bool)

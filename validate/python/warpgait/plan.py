@@ -11,6 +11,8 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +104,24 @@ class Plan:
     def duration(self) -> float:
         """The horizon, s."""
         return float(self.t[-1])
+
+    @cached_property
+    def center_direction(self) -> Array:
+        """(N, E, 3) unit vectors from the contact points to the feet's centres.
+
+        In stance the terrain's normal. In the air the terrain below means nothing to a foot: the direction turns smoothly from the normal at
+        lift-off to that at touch-down, or else every stone that is passed would shake the foot.
+        """
+        direction = self.foot_normal.copy()
+        for e in range(direction.shape[1]):
+            stance = np.flatnonzero(self.foot_contact[:, e])
+            for before, after in pairwise(stance):
+                s = np.arange(1, after - before)[:, None] / (after - before)
+                share = s**3 * (10 - 15 * s + 6 * s * s)
+                ends = self.foot_normal[before, e], self.foot_normal[after, e]
+                between = (1 - share) * ends[0] + share * ends[1]
+                direction[before + 1 : after, e] = between / np.linalg.norm(between, axis=-1, keepdims=True)
+        return direction
 
     @property
     def weight(self) -> float:

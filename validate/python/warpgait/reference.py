@@ -26,7 +26,7 @@ class Reference:
     foot: Array  # (K, E, 3) centres
     foot_velocity: Array  # (K, E, 3)
     foot_acceleration: Array  # (K, E, 3)
-    normal: Array  # (K, E, 3)
+    normal: Array  # (K, E, 3) of the terrain in stance; in the air, from contact point to centre
     force: Array  # (K, E, 3)
     contact: Bools  # (K, E)
 
@@ -49,10 +49,10 @@ def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None 
 
     quaternion = plan.base_quaternion_wxyz[:, [1, 2, 3, 0]]
     rotation = Slerp(plan.t, Rotation.from_quat(quaternion))(t).as_matrix()
-    # The centre is the contact point plus radius times normal; the normal turns while the foot swings over rough ground.
-    normal = linear(plan.foot_normal)
+    # The centre is the contact point plus radius times a direction, which turns while the foot swings.
+    normal = linear(plan.center_direction)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    turning = np.gradient(plan.foot_normal, plan.t, axis=0) * ~plan.foot_contact[..., None]
+    turning = np.gradient(plan.center_direction, plan.t, axis=0) * ~plan.foot_contact[..., None]
     return Reference(
         t=t,
         com=CubicHermiteSpline(plan.t, plan.base_position, plan.base_linear_velocity)(t),

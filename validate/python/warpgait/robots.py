@@ -162,7 +162,7 @@ def to_toml(robot: CentroidalRobot) -> str:
     for name, nominal, box, leg, torque in zip(
         robot.feet, robot.nominal, robot.reach, robot.legs, robot.torque_limit, strict=True
     ):
-        hip = leg.hip + [leg.flexion_offset, 0, 0] - c
+        hip = leg.hip + np.array([leg.flexion_offset, 0, 0]) - c
         lines += [
             "",
             "[[feet]]",

@@ -1,0 +1,92 @@
+"""Joint speeds and torques that the planner bounds, against MuJoCo's kinematics of the full model."""
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import warpgait
+from warpgait.kinematics import legs
+from warpgait.model import composite, find_model, indices, load_spec, stand
+
+# Fast and up a slope, so that both limits matter.
+SCENARIO = """
+schema = 1
+formulation = "direct"
+horizon = 4.0
+[robot]
+name = "anymal_c"
+[terrain]
+kind = "formula"
+expression = "0.35*x"
+extent = [-2.0, 2.0, -2.0, 2.0]
+[start]
+position = [-0.4, 0.0]
+[goal]
+position = [0.2, 0.0]
+"""
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_planned_joints_keep_their_limits_in_mujoco(known: bool, tmp_path: object) -> None:
+    robot = find_model("anymal_c").with_suffix(".toml").read_text()
+    if not known:  # the same robot, of whose legs the planner knows nothing
+        lines = robot.split("\n")
+        inside = [any(line.startswith(key) for key in LEG_KEYS) for line in lines]
+        robot = "\n".join(line for line, leg in zip(lines, inside, strict=True) if not leg)
+    folder = str(tmp_path)
+    with open(f"{folder}/robot.toml", "w") as file:
+        file.write(robot)
+    scenario = SCENARIO.replace('name = "anymal_c"', 'name = "anymal_c"\nfile = "robot.toml"')
+    with open(f"{folder}/slope.toml", "w") as file:
+        file.write(scenario)
+    plan = warpgait.solve(f"{folder}/slope.toml")
+    assert plan.solved
+    speed, torque = shares(plan)
+    if known:
+        assert speed < 0.9 and torque < 0.9, (speed, torque)
+        assert speed > 0.3 and torque > 0.3, (speed, torque)  # of something
+    else:
+        assert max(speed, torque) > 0.9, (speed, torque)  # the rows are needed here
+
+
+LEG_KEYS = (
+    "[feet.leg]",
+    "hip =",
+    "lateral =",
+    "thigh =",
+    "shank =",
+    "knee_radius =",
+    "corner =",
+    "bend =",
+    "foot_radius =",
+    "speed_limit =",
+    "torque_limit =",
+)
+
+
+def shares(plan: warpgait.Trajectory) -> tuple[float, float]:
+    """Greatest joint speed and greatest torque of a standing leg without mass, of their limits."""
+    model = load_spec(find_model("anymal_c")).compile()
+    data = mujoco.MjData(model)
+    index = indices(model, plan.foot_names)
+    stand(model, data)
+    center = composite(model, data).center_of_mass
+    t = np.arange(0.0, plan.duration, 0.005)
+    base, feet = plan.base(t), plan.feet(t)
+    rotation = Rotation.from_quat(base.quaternion_wxyz[:, [1, 2, 3, 0]]).as_matrix()
+    local = np.einsum("nji,nej->nei", rotation, feet.position - base.position[:, None]) + center + [0, 0, index.radius]
+    q = np.stack([leg.inverse(local[:, e])[0] for e, leg in enumerate(legs(model, index.feet))], 1)
+    torque = np.zeros(q.shape)
+    J = np.zeros((3, model.nv))
+    for k in range(len(t)):
+        data.qpos[:3] = base.position[k] - rotation[k] @ center
+        data.qpos[3:7] = base.quaternion_wxyz[k]
+        data.qpos[index.qpos] = q[k]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for e in range(len(index.feet)):
+            mujoco.mj_jac(model, data, J, None, feet.position[k, e], index.body[e])
+            torque[k, e] = -J[:, index.qvel[e]].T @ feet.force[k, e]
+    speed = np.abs(np.gradient(q, t, axis=0)).max() / index.speed_limit
+    return float(speed), float((np.abs(torque) / index.torque_limit).max())
