@@ -13,6 +13,7 @@ use crate::check::{CheckReport, check};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
 use crate::nlp::derivatives::{self, DerivativeError};
+use crate::nlp::model::gait;
 use crate::nlp::solve::{self as nlp, Motion};
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
@@ -80,6 +81,8 @@ pub fn run(
     let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
     phases_match(loaded, &robot)?;
     nlp::validate(scenario)?;
+    // Refused now and not after the map.
+    gait(scenario, &robot)?;
 
     // Whoever wishes to stop is asked again at the first iteration.
     let _ = observer(&Event::Stage("terrain"));

@@ -101,7 +101,7 @@ fn splines_that_do_not_fit_together_are_refused() {
     type Spoil = fn(&mut Plan);
     let cases: [(Spoil, &str); 11] = [
         (|plan| plan.splines.retain(|(name, ..)| name != "LF_footholds"), "spline/LF_footholds: is missing"),
-        (|plan| splines(plan, "base_control_points").1 = vec![86, 3], "expected (intervals + 3, 6)"),
+        (|plan| splines(plan, "base_control_points").1 = vec![86, 3], "expected (knot intervals + 3, 6)"),
         (|plan| splines(plan, "base_control_points").2[1] += 0.1, "start and end at rest"),
         (|plan| splines(plan, "base_knots").2[7] += 0.01, "not uniform"),
         (|plan| splines(plan, "base_knots").2.fill(f64::NAN), "not uniform"),

@@ -35,7 +35,7 @@ const HILL_GOALS: [[f64; 2]; GOALS] = [
 ];
 /// Distance of the goals outside the pit from its centre, m.
 const PIT_GOAL: f64 = 2.0;
-/// Knot spacings of base and forces, in time steps.
+/// Knot spacings of the base, in time steps.
 const KNOTS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Horizons of `speed`, s.
 const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
@@ -240,7 +240,7 @@ impl Protocol<'_> {
             for knots in if self.quick() { &KNOTS[..2] } else { &KNOTS[..] } {
                 for way in thinned(ways(terrain), true) {
                     for formulation in &self.formulations() {
-                        let parameter = Some(("knots", *knots));
+                        let parameter = Some(("base_knots", *knots));
                         cases.push(self.plan(
                             Work::Plan,
                             terrain,
@@ -393,9 +393,7 @@ impl Protocol<'_> {
     ) -> String {
         let adhesive = if is_steep(terrain) { "\"LF\", \"RF\"" } else { "" };
         let (parameter, knots) = match parameter {
-            Some(("knots", n)) => {
-                (String::new(), format!("[discretization]\nbase_knots = {n}\nforce_knots = {n}\n\n"))
-            }
+            Some(("base_knots", n)) => (String::new(), format!("[discretization]\nbase_knots = {n}\n\n")),
             Some((key, value)) => (format!("{key} = {value:?}\n"), String::new()),
             None => Default::default(),
         };

@@ -130,10 +130,10 @@ impl Constraint for Dynamics {
             for &(l, weight) in &stencil.wrench {
                 let p = state.base[l].position();
                 for i in 0..model.feet() {
-                    if model.layout.force(i, l).is_some() {
+                    if let Some((j, _)) = model.layout.force(i, l) {
                         let f = state.forces[i][l] * weight;
                         force += f;
-                        torque += (state.foot(model, i, l).point.position - p).cross(&f);
+                        torque += (state.contacts[i][j].point.position - p).cross(&f);
                     }
                 }
             }
@@ -161,7 +161,7 @@ impl Constraint for Dynamics {
                 let base = &state.base[l];
                 let mut total = Vector3::zeros();
                 for i in 0..model.feet() {
-                    let Some((j, force_node)) = layout.force(i, l) else { continue };
+                    let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
                     let contact = &state.contacts[i][j];
                     let (f, arm) = (state.forces[i][l] * weight, contact.point.position - base.position());
                     total += f;
@@ -256,7 +256,7 @@ impl Constraint for Dynamics {
             let base_position = Tangent::position(model, &base.point, &layout.base[l]);
             let form = -cross_matrix(&by_torque);
             for i in 0..model.feet() {
-                let Some((j, force_node)) = layout.force(i, l) else { continue };
+                let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
                 let contact = &state.contacts[i][j];
                 let (f, arm) = (state.forces[i][l], contact.point.position - base.position());
                 // λ · (r × f): ∂/∂r = f × λ, ∂/∂f = λ × r, ∂²/∂r∂f = −[λ].

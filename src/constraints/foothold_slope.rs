@@ -21,7 +21,7 @@ pub struct FootholdSlope {
     max_slope: f64,
     /// (foot, stance, where to look).
     places: Vec<(usize, usize, [f64; 2])>,
-    samples: Vec<usize>,
+    samples: Vec<f64>,
 }
 
 /// Where to look about a foothold, in margins.
@@ -110,6 +110,6 @@ impl Constraint for FootholdSlope {
     }
 
     fn place(&self, row: usize) -> Place {
-        Place { foot: Some(self.places[row].0), sample: self.samples[row] as f64 }
+        Place { foot: Some(self.places[row].0), sample: self.samples[row] }
     }
 }

@@ -9,7 +9,8 @@
 //! so that Newton's steps would jump from one side of a slim cone to the other for ever. The normal is constant during a
 //! stance, f is linear between its samples and the cone is convex: what holds at the samples holds in between.
 //!
-//! Rows: one for each free force, in m g.
+//! Rows: one for each free force, in m g. Where durations are optimized the rows are on the full force that f is a share of,
+//! which the cone then holds as well.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -50,10 +51,10 @@ impl Friction {
     }
 }
 
-/// The node of a force.
+/// The node of a force, the full one where durations are optimized.
 pub(crate) fn force_node(model: &Model, (i, j, k): ForcePlace) -> &LinearNode {
     let stance = &model.layout.feet[i].stances[j];
-    stance.forces[k - stance.stance.start].as_ref().expect("places are those of free forces")
+    stance.force(k).expect("places are those of free forces")
 }
 
 /// The tangents of a force and of its foothold.
@@ -67,7 +68,7 @@ pub(crate) fn with_tangents<T>(
     let foothold = &model.layout.feet[i].stances[j].foothold;
     act(
         &Tangent::force(model, contact, force_node(model, (i, j, k))),
-        &Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][k]),
+        &Tangent::force_by_foothold(model, contact, foothold, &state.warped_full_forces[i][k]),
         &Tangent::position(model, &contact.point, foothold),
     )
 }
@@ -123,7 +124,7 @@ impl Cone {
 /// The normal, f, ∂u/∂p, and the cone there.
 fn parts(friction: f64, state: &State, (i, j, k): ForcePlace) -> (Normal, Vector3<f64>, Vector3<f64>, Cone) {
     let normal = Normal::new(&state.contacts[i][j].ground);
-    let f = state.forces[i][k];
+    let f = state.full_forces[i][k];
     let (u, du) = normal.along(&f);
     (normal, f, du, Cone::new(friction, u, f.norm_squared()))
 }
@@ -171,7 +172,7 @@ impl Constraint for Friction {
         for (&lambda, &place) in multipliers.iter().zip(&self.places) {
             let (normal, f, du, cone) = parts(self.friction, state, place);
             let ((i, j, k), n) = (place, normal.n);
-            curvature.forces[i][k] += (n * cone.u + f * (2.0 * cone.w)) * lambda;
+            curvature.full_forces[i][k] += (n * cone.u + f * (2.0 * cone.w)) * lambda;
             curvature.contacts[i][j] += du * (cone.u * lambda);
             // By the chain rule through u(f, p) and w(f).
             let mixed = n * cone.uu + f * (2.0 * cone.uw);

@@ -44,14 +44,14 @@ impl Constraint for FrictionConformal {
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &(i, _, k)) in out.iter_mut().zip(&self.places) {
-            let f = &state.warped_forces[i][k];
+            let f = &state.warped_full_forces[i][k];
             *value = Cone::new(self.friction, f.z, f.norm_squared()).g;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &(i, j, k)) in self.places.iter().enumerate() {
-            let f = &state.warped_forces[i][k];
+            let f = &state.warped_full_forces[i][k];
             let cone = Cone::new(self.friction, f.z, f.norm_squared());
             let gradient = f * (2.0 * cone.w) + Vector3::z() * cone.u;
             for d in 0..3 {
@@ -69,7 +69,7 @@ impl Constraint for FrictionConformal {
         sink: &mut Sink,
     ) {
         for (&lambda, &(i, j, k)) in multipliers.iter().zip(&self.places) {
-            let f = &state.warped_forces[i][k];
+            let f = &state.warped_full_forces[i][k];
             let cone = Cone::new(self.friction, f.z, f.norm_squared());
             let node = force_node(model, (i, j, k));
             sink.own(node, 0, 0, lambda * 2.0 * cone.w);

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::friction::{ForcePlace, force_node, force_places};
+use super::friction::{ForcePlace, force_places};
 use super::{Constraint, Place, reach};
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
@@ -67,7 +67,8 @@ fn tangents<'a>(
 ) -> (Tangent<'a>, [Tangent<'a>; 2]) {
     let contact = &state.contacts[i][j];
     let foothold = &model.layout.feet[i].stances[j].foothold;
-    let own = Tangent::force(model, contact, force_node(model, (i, j, k)));
+    let (_, node) = state.force_node(model, i, k).expect("places are those of free forces");
+    let own = Tangent::force(model, contact, node);
     let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][k]);
     (Tangent::turn(model, &state.base[k], &model.layout.base[k]), [own, by_foothold])
 }
@@ -146,14 +147,14 @@ impl Constraint for JointTorque {
             // In both: (change of r)ᵀ B (change of Rᵀ f), with R (change of r) = [arm] δ + dp_i − dp.
             let by_r = Matrix3::from_fn(|d, c| sum[c].first[d]);
             let form = r * by_r * r.transpose();
-            let foot = &state.contacts[i][at.1];
+            let foot = state.foot(model, i, k);
             let base = &state.base[k];
             let arm = cross_matrix(&(foot.point.position - base.position()));
             let node = &model.layout.base[k];
             for (by, tangent) in [
                 (arm.transpose(), turn),
                 (-Matrix3::identity(), Tangent::position(model, &base.point, node)),
-                (Matrix3::identity(), Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k])),
+                (Matrix3::identity(), Tangent::position(model, &foot.point, state.foot_node(i, k))),
             ] {
                 tangent.cross(&(by * form * cross_matrix(&f)), &turn, sink);
                 for force in &forces {

@@ -110,7 +110,7 @@ impl KneeClearance {
         [
             Tangent::turn(model, base, node),
             Tangent::position(model, &base.point, node),
-            Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]),
+            Tangent::position(model, &foot.point, state.foot_node(i, k)),
         ]
     }
 }

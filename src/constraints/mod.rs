@@ -3,6 +3,7 @@
 //! A constraint is written in ambient quantities; see [`crate::nlp`].
 
 pub mod base_clearance;
+pub mod durations;
 pub mod dynamics;
 pub mod foothold_slope;
 pub mod friction;

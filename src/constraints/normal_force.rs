@@ -5,7 +5,7 @@
 //!     least ≤ n·f ≤ force_limit          (others: a standing foot presses on the ground, [`LEAST_NORMAL_FORCE`])
 //! ```
 //!
-//! Rows: one for each free force, in m g.
+//! Rows: one for each free force, in m g; as in [`super::friction`] for the full one.
 
 use super::friction::{ForcePlace, force_places, say_blocks, with_tangents};
 use super::{Constraint, Normal, Place};
@@ -47,7 +47,7 @@ impl Constraint for NormalForce {
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &(i, j, k)) in out.iter_mut().zip(&self.places) {
-            *value = Normal::new(&state.contacts[i][j].ground).n.dot(&state.forces[i][k]);
+            *value = Normal::new(&state.contacts[i][j].ground).n.dot(&state.full_forces[i][k]);
         }
     }
 
@@ -55,7 +55,7 @@ impl Constraint for NormalForce {
         for (r, &place) in self.places.iter().enumerate() {
             let (i, j, k) = place;
             let normal = Normal::new(&state.contacts[i][j].ground);
-            let (_, by_position) = normal.along(&state.forces[i][k]);
+            let (_, by_position) = normal.along(&state.full_forces[i][k]);
             with_tangents(model, state, place, |force, by_foothold, position| {
                 force.row(first + r, &normal.n, sink);
                 by_foothold.row(first + r, &normal.n, sink);
@@ -75,9 +75,9 @@ impl Constraint for NormalForce {
         for (&lambda, &place) in multipliers.iter().zip(&self.places) {
             let (i, j, k) = place;
             let normal = Normal::new(&state.contacts[i][j].ground);
-            let f = state.forces[i][k];
+            let f = state.full_forces[i][k];
             let (_, by_position) = normal.along(&f);
-            curvature.forces[i][k] += normal.n * lambda;
+            curvature.full_forces[i][k] += normal.n * lambda;
             curvature.contacts[i][j] += by_position * lambda;
             let (fp, pp) = (normal.jacobian() * lambda, normal.curvature(&f) * lambda);
             say_blocks(model, state, place, None, &fp, &pp, sink);

@@ -23,17 +23,20 @@ pub struct Reach {
 /// Taken off the box on each side, m, so that it holds between the samples. Between two samples a path with acceleration a
 /// leaves the line through them by up to a Δt²/8: 0.5 mm for the body at 1.5 m/s², and 15 mm for a foot at 50 m/s².
 const STANDING_MARGIN: f64 = 0.001;
-/// At lift-off and touch-down.
+/// At lift-off and touch-down; where these are variables, at their earliest and latest.
 const SWITCH_MARGIN: f64 = 0.009;
-/// In swing.
+/// In swing, or where a foot may swing.
 const SWINGING_MARGIN: f64 = 0.015;
 
 fn margin(model: &Model, i: usize, k: usize) -> f64 {
-    let layout = &model.layout;
-    match layout.phase[i][k] {
-        Phase::Swing(_) => SWINGING_MARGIN,
-        Phase::Stance(_) if layout.force(i, k).is_none() => SWITCH_MARGIN,
-        Phase::Stance(_) => STANDING_MARGIN,
+    let phase = &model.layout.phase[i];
+    let swings = |k: usize| matches!(phase.get(k), Some(Phase::Swing(_)));
+    if swings(k) {
+        SWINGING_MARGIN
+    } else if swings(k + 1) || (k > 0 && swings(k - 1)) {
+        SWITCH_MARGIN
+    } else {
+        STANDING_MARGIN
     }
 }
 
@@ -62,7 +65,7 @@ pub(crate) fn say_row(
     // d(Rᵀ r) = Rᵀ ([r] δ + dp_i − dp).
     Tangent::turn(model, base, node).row(row, &(-arm.cross(&world)), sink);
     Tangent::position(model, &base.point, node).row(row, &-world, sink);
-    Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]).row(row, &world, sink);
+    Tangent::position(model, &foot.point, state.foot_node(i, k)).row(row, &world, sink);
 }
 
 /// Second derivatives of λ · Rᵀ(p_i − p).
@@ -84,7 +87,7 @@ pub(crate) fn say_curvature(
     let form = cross_matrix(&world);
     let node = &model.layout.base[k];
     let turn = Tangent::turn(model, base, node);
-    turn.cross(&form, &Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]), sink);
+    turn.cross(&form, &Tangent::position(model, &foot.point, state.foot_node(i, k)), sink);
     turn.cross(&-form, &Tangent::position(model, &base.point, node), sink);
 }
 
@@ -105,7 +108,7 @@ pub(crate) fn say_quadratic(
     let node = &model.layout.base[k];
     let turn = Tangent::turn(model, base, node);
     let body = Tangent::position(model, &base.point, node);
-    let foot = Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]);
+    let foot = Tangent::position(model, &foot.point, state.foot_node(i, k));
     turn.quadratic(&(by_turn * arm), sink);
     body.quadratic(&form, sink);
     foot.quadratic(&form, sink);

@@ -18,11 +18,11 @@ use crate::nlp::{Model, State};
 #[derive(Clone, Debug)]
 pub struct OnGround {
     places: Vec<(usize, usize)>,
-    samples: Vec<usize>,
+    samples: Vec<f64>,
 }
 
 /// All (foot, stance), and the sample at which each begins.
-pub(crate) fn all_stances(model: &Model) -> (Vec<(usize, usize)>, Vec<usize>) {
+pub(crate) fn all_stances(model: &Model) -> (Vec<(usize, usize)>, Vec<f64>) {
     model
         .layout
         .feet
@@ -86,6 +86,6 @@ impl Constraint for OnGround {
     }
 
     fn place(&self, row: usize) -> Place {
-        Place { foot: Some(self.places[row].0), sample: self.samples[row] as f64 }
+        Place { foot: Some(self.places[row].0), sample: self.samples[row] }
     }
 }

@@ -9,13 +9,14 @@
 //! like the parabola 4u(1−u), so that feet leave and land steeply enough to pass stones. In the space of the variables the
 //! free control points are bounded as well where that is sound (see `nlp::problem`).
 //!
-//! Rows: one for each sample strictly inside a swing, then one for the middle of each swing; m.
+//! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
+//! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
 
 use nalgebra::Vector3;
 
 use super::{Constraint, Normal, Place};
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, FootNode, Tangent};
+use crate::nlp::state::{Curvature, FootNode, Tangent, swing_points};
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;
@@ -27,7 +28,7 @@ const FALL_OFF: f64 = 0.5;
 #[derive(Clone, Copy, Debug)]
 enum At {
     Sample { foot: usize, k: usize, u: f64 },
-    Apex { foot: usize, swing: usize, sample: f64 },
+    Point { foot: usize, n: usize, u: f64, apex: bool, sample: f64 },
 }
 
 /// Swinging feet over the ground.
@@ -43,22 +44,26 @@ impl SwingClearance {
         let mut places = Vec::new();
         for (foot, variables) in model.layout.feet.iter().enumerate() {
             for (k, phase) in model.layout.phase[foot].iter().enumerate() {
-                if let Phase::Swing(j) = phase {
-                    let s = variables.swings[*j].swing;
-                    places.push(At::Sample { foot, k, u: (k - s.start) as f64 / (s.end - s.start) as f64 });
+                if let Phase::Swing(j) = *phase
+                    && variables.swings[j].switches.is_none()
+                {
+                    let s = variables.swings[j].swing;
+                    places.push(At::Sample { foot, k, u: (k as f64 - s.start) / (s.end - s.start) });
                 }
             }
-            for (swing, s) in variables.swings.iter().enumerate() {
-                places.push(At::Apex { foot, swing, sample: (s.swing.start + s.swing.end) as f64 / 2.0 });
+            for (n, at) in swing_points(&model.layout, foot).iter().enumerate() {
+                let s = variables.swings[at.swing].swing;
+                let sample = s.start + at.u * (s.end - s.start);
+                places.push(At::Point { foot, n, u: at.u, apex: at.apex, sample });
             }
         }
         Self { clearance, places }
     }
 
-    fn node<'a>(&self, model: &'a Model, state: &'a State, at: At) -> (&'a FootNode, &'a LinearNode) {
+    fn node<'a>(&self, state: &'a State, at: At) -> (&'a FootNode, &'a LinearNode) {
         match at {
-            At::Sample { foot, k, .. } => (&state.swings[foot][k], &model.layout.foot_nodes[foot][k]),
-            At::Apex { foot, swing, .. } => (&state.apexes[foot][swing], &state.apex_nodes[foot][swing]),
+            At::Sample { foot, k, .. } => (&state.swings[foot][k], state.foot_node(foot, k)),
+            At::Point { foot, n, .. } => (&state.points[foot][n], &state.swing_points[foot][n].node),
         }
     }
 }
@@ -85,21 +90,21 @@ impl Constraint for SwingClearance {
         upper.fill(f64::INFINITY);
         for (r, at) in self.places.iter().enumerate() {
             lower[r] = match at {
-                At::Sample { u, .. } => FALL_OFF * self.clearance * 4.0 * u * (1.0 - u),
-                At::Apex { .. } => self.clearance,
+                At::Point { apex: true, .. } => self.clearance,
+                At::Sample { u, .. } | At::Point { u, .. } => FALL_OFF * self.clearance * 4.0 * u * (1.0 - u),
             };
         }
     }
 
-    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
+    fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &at) in out.iter_mut().zip(&self.places) {
-            *value = distance(self.node(model, state, at).0).0;
+            *value = distance(self.node(state, at).0).0;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
-            let (foot, node) = self.node(model, state, at);
+            let (foot, node) = self.node(state, at);
             Tangent::position(model, &foot.point, node).row(first + r, &distance(foot).1, sink);
         }
     }
@@ -113,11 +118,11 @@ impl Constraint for SwingClearance {
         sink: &mut Sink,
     ) {
         for (&lambda, &at) in multipliers.iter().zip(&self.places) {
-            let (foot, node) = self.node(model, state, at);
+            let (foot, node) = self.node(state, at);
             let (_, by_position, normal) = distance(foot);
             match at {
                 At::Sample { foot, k, .. } => curvature.swings[foot][k] += by_position * lambda,
-                At::Apex { foot, swing, .. } => curvature.apexes[foot][swing] += by_position * lambda,
+                At::Point { foot, n, .. } => curvature.points[foot][n] += by_position * lambda,
             }
             let (gap, by_gap) = foot.gap();
             let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
@@ -132,7 +137,7 @@ impl Constraint for SwingClearance {
     fn place(&self, row: usize) -> Place {
         match self.places[row] {
             At::Sample { foot, k, .. } => Place { foot: Some(foot), sample: k as f64 },
-            At::Apex { foot, sample, .. } => Place { foot: Some(foot), sample },
+            At::Point { foot, sample, .. } => Place { foot: Some(foot), sample },
         }
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! All are sums of squares, and dimensionless: the weights carry the units.
 
+pub mod base_acceleration;
+pub mod force_rate;
 pub mod posture;
-pub mod smoothness;
+pub mod swing_acceleration;
 
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
@@ -18,5 +20,13 @@ pub trait Cost {
     /// Says its gradient as row 0.
     fn gradient(&self, model: &Model, state: &State, x: &[f64], sink: &mut Sink);
     /// Says its second derivatives times `factor`; those through ambient quantities go to `curvature`.
-    fn hessian(&self, model: &Model, state: &State, factor: f64, curvature: &mut Curvature, sink: &mut Sink);
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        x: &[f64],
+        factor: f64,
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    );
 }

@@ -26,10 +26,12 @@ impl Posture {
         for (i, foot) in model.layout.feet.iter().enumerate() {
             for stance in &foot.stances {
                 let s = stance.stance;
-                let k = match (s.start, s.end) {
-                    (0, _) => 0,
-                    (_, end) if end == last => last,
-                    (start, end) => usize::midpoint(start, end),
+                let k = if s.start == 0.0 {
+                    0
+                } else if s.end == last as f64 {
+                    last
+                } else {
+                    (0.5 * (s.start + s.end)) as usize
                 };
                 places.push((i, k));
             }
@@ -57,7 +59,15 @@ impl Cost for Posture {
         }
     }
 
-    fn hessian(&self, model: &Model, state: &State, factor: f64, curvature: &mut Curvature, sink: &mut Sink) {
+    fn hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        _x: &[f64],
+        factor: f64,
+        curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
         let weight = factor * self.weight;
         for &(i, k) in &self.places {
             let error = reach::value(model, state, (i, k)) - model.nominal[i];
@@ -69,7 +79,7 @@ impl Cost for Posture {
             let node = &model.layout.base[k];
             let turn = Tangent::turn(model, base, node);
             let body = Tangent::position(model, &base.point, node);
-            let foot = Tangent::position(model, &foot.point, &model.layout.foot_nodes[i][k]);
+            let foot = Tangent::position(model, &foot.point, state.foot_node(i, k));
             turn.quadratic(&(arm.transpose() * arm * weight), sink);
             body.quadratic(&one, sink);
             foot.quadratic(&one, sink);

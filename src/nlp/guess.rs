@@ -8,6 +8,7 @@ use crate::scenario::Scenario;
 use crate::trajectory::rotation::{euler, euler_angles, project_to_rotation};
 use crate::trajectory::space::Space;
 use crate::trajectory::spline::SWING_CONTROL_POINTS;
+use crate::trajectory::switches;
 use crate::warp::Order;
 use crate::{Error, Result};
 
@@ -106,10 +107,16 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
     final_[5] = first[5] + wrapped(final_[5] - first[5]);
 
     let swings = || layout.feet.iter().flat_map(|f| &f.swings);
-    let set_off =
-        swings().map(|s| s.swing.start).min().map_or(0.0, |k| k as f64 * layout.time_step - LEAD).max(0.0);
-    let arrive =
-        swings().map(|s| s.swing.end).max().map_or(last, |k| k as f64 * layout.time_step + LEAD).min(last);
+    let set_off = swings()
+        .map(|s| s.swing.start)
+        .reduce(f64::min)
+        .map_or(0.0, |k| k * layout.time_step - LEAD)
+        .max(0.0);
+    let arrive = swings()
+        .map(|s| s.swing.end)
+        .reduce(f64::max)
+        .map_or(last, |k| k * layout.time_step + LEAD)
+        .min(last);
     let base_at = |t: f64| -> [f64; 6] {
         let u = progress(t, set_off, arrive);
         if model.space.is_warped() {
@@ -136,19 +143,31 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
     }
     x[..6].copy_from_slice(&first);
 
-    // How many feet share the weight at a sample.
+    // How many feet share the weight at a sample, those near a switch counted as the shares of their force that act.
+    let shares = |i: usize, k: usize| {
+        layout.force(i, k).map_or(0.0, |(j, _)| {
+            let swings = &layout.feet[i].swings;
+            let switch = |j: Option<usize>, which: usize| {
+                let swing = swings.get(j?)?;
+                swing.switches.map(|_| switches::guessed(&swing.swing)[which])
+            };
+            switches::share(k, switch(j.checked_sub(1), 1), switch(Some(j), 0))
+        })
+    };
     let bearing: Vec<f64> = (0..=layout.intervals)
-        .map(|k| (0..model.feet()).filter(|&i| layout.force(i, k).is_some()).count().max(1) as f64)
+        .map(|k| (0..model.feet()).map(|i| shares(i, k)).sum::<f64>().max(1.0))
         .collect();
     let apex = SWING_APEX * scenario.motion.swing_clearance;
     for (i, foot) in layout.feet.iter().enumerate() {
         let mut footholds = Vec::new();
         for stance in &foot.stances {
             let s = stance.stance;
-            let middle = match (s.start, s.end) {
-                (0, _) => 0.0,
-                (_, end) if end == layout.intervals => last,
-                (a, b) => 0.5 * (a + b) as f64 * layout.time_step,
+            let middle = if s.start == 0.0 {
+                0.0
+            } else if s.end == layout.intervals as f64 {
+                last
+            } else {
+                0.5 * (s.start + s.end) * layout.time_step
             };
             let foothold = foothold_under(model, i, &base_at(middle));
             x[stance.foothold.first()..][..3].copy_from_slice(foothold.as_slice());
@@ -162,6 +181,9 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
             }
         }
         for (j, swing) in foot.swings.iter().enumerate() {
+            if let Some(lift_off) = swing.switches {
+                x[lift_off..lift_off + 2].copy_from_slice(&switches::guessed(&swing.swing));
+            }
             let (from, to) = (footholds[j], footholds[j + 1]);
             for c in 0..SWING_CONTROL_POINTS {
                 let share = (c + 1) as f64 / (SWING_CONTROL_POINTS + 1) as f64;

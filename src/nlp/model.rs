@@ -55,11 +55,20 @@ pub struct Model {
     pub layout: Layout,
 }
 
+/// The gait of a scenario, for a robot.
+///
+/// # Errors
+/// For a gait that the robot, the horizon or the time step does not allow, or whose durations cannot be optimized.
+pub fn gait(scenario: &Scenario, robot: &Robot) -> Result<Gait> {
+    let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
+    Gait::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
+}
+
 impl Model {
     /// Puts a scenario together.
     pub fn new(scenario: &Scenario, robot: &Robot, ground: Arc<Heightfield>, space: Space) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
-        let gait = Gait::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))?;
+        let gait = gait(scenario, robot)?;
         let adhesive_feet = &scenario.robot.adhesive_feet;
         if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
             return Err(Error::input(format!(

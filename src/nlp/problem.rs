@@ -2,6 +2,7 @@
 
 use crate::constraints::Constraint;
 use crate::constraints::base_clearance::BaseClearance;
+use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
 use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
@@ -16,8 +17,10 @@ use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
 use crate::constraints::swing::SwingClearance;
 use crate::costs::Cost;
+use crate::costs::base_acceleration::BaseAcceleration;
+use crate::costs::force_rate::ForceRate;
 use crate::costs::posture::Posture;
-use crate::costs::smoothness::Smoothness;
+use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::NlpProblem;
 use crate::scenario::{Cone, Law, Scenario};
 use crate::trajectory::spline::SWING_CONTROL_POINTS;
@@ -97,15 +100,18 @@ impl Problem {
             blocks.push(Box::new(JointTorque::new(&model)));
             blocks.push(Box::new(KneeClearance::new(&model)));
         }
+        if model.layout.has_switches() {
+            blocks.push(Box::new(Durations::new(&model, scenario.gait.duration_bounds)));
+        }
         let [base, force] = motion.smoothness.map(|weight| COST_SCALE * weight);
         let mut costs: Vec<Box<dyn Cost>> = Vec::new();
         if choice.with_costs && base > 0.0 {
-            costs.push(Box::new(Smoothness::base_acceleration(&model, base)));
-            costs.push(Box::new(Smoothness::swing_acceleration(&model, SWING_WEIGHT * base)));
+            costs.push(Box::new(BaseAcceleration::new(&model, base)));
+            costs.push(Box::new(SwingAcceleration::new(&model, SWING_WEIGHT * base)));
             costs.push(Box::new(Posture::new(&model, POSTURE_WEIGHT * base)));
         }
         if choice.with_costs && force > 0.0 {
-            costs.push(Box::new(Smoothness::force_rate(&model, force)));
+            costs.push(Box::new(ForceRate::new(&model, force)));
         }
         Self::compose(model, blocks, costs, initial, choice.exact_hessian)
     }
@@ -144,6 +150,7 @@ impl Problem {
                     &blocks,
                     &offsets,
                     &costs,
+                    &initial,
                     1.0,
                     &multipliers,
                     &mut curvature,
@@ -216,23 +223,35 @@ impl Problem {
                 if (swing.control_points..swing.control_points + 3 * SWING_CONTROL_POINTS).contains(&v) {
                     return format!("{name} swing {j} control point {}", (v - swing.control_points) / 3);
                 }
+                match swing.switches {
+                    Some(lift_off) if v == lift_off => return format!("{name} lift-off {j}"),
+                    Some(lift_off) if v == lift_off + 1 => return format!("{name} touch-down {j}"),
+                    _ => {}
+                }
             }
         }
         format!("variable {v}")
     }
 }
 
-/// The base's first control points are pinned; in F, the free control points of a swing stay above the ground: z̄ ≥ 0 holds for a
-/// spline whose control points obey it (Eq. 8, second line, at every instant).
+/// The base's first control points are pinned; switches stay within their rooms; in F, the free control points of a swing stay
+/// above the ground: z̄ ≥ 0 holds for a spline whose control points obey it (Eq. 8, second line, at every instant).
 fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
     let mut upper = vec![f64::INFINITY; model.layout.variables];
     lower[..6].copy_from_slice(&initial[..6]);
     upper[..6].copy_from_slice(&initial[..6]);
-    if model.space.is_warped() {
-        for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
+    for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
+        if model.space.is_warped() {
             for c in 0..SWING_CONTROL_POINTS {
                 lower[swing.control_points + 3 * c + 2] = 0.0;
+            }
+        }
+        if let Some(lift_off) = swing.switches {
+            let s = &swing.swing;
+            for (n, nominal) in [s.start, s.end].into_iter().enumerate() {
+                lower[lift_off + n] = nominal - s.room[n];
+                upper[lift_off + n] = nominal + s.room[n];
             }
         }
     }
@@ -246,6 +265,7 @@ fn say_hessian(
     blocks: &[Box<dyn Constraint>],
     offsets: &[usize],
     costs: &[Box<dyn Cost>],
+    x: &[f64],
     factor: f64,
     multipliers: &[f64],
     curvature: &mut Curvature,
@@ -256,7 +276,7 @@ fn say_hessian(
         block.hessian(model, state, &multipliers[first..first + block.rows()], curvature, sink);
     }
     for cost in costs {
-        cost.hessian(model, state, factor, curvature, sink);
+        cost.hessian(model, state, x, factor, curvature, sink);
     }
     curvature.say(model, state, sink);
 }
@@ -350,6 +370,7 @@ impl NlpProblem for Problem {
                     blocks,
                     offsets,
                     costs,
+                    x,
                     objective_factor,
                     multipliers,
                     curvature,

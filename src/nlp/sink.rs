@@ -78,22 +78,19 @@ impl Sink<'_> {
     /// Adds the derivative `value` of a row with respect to component `d` of a node.
     #[inline]
     pub fn node(&mut self, row: usize, node: &LinearNode, d: usize, value: f64) {
-        for &(variable, weight) in &node.terms {
-            self.add(row, variable + d, weight * value);
-        }
+        node.differential(d).for_each(|(variable, weight)| self.add(row, variable, weight * value));
     }
 
     /// Adds the second derivative `value` with respect to component `a` of one node and component `b` of another *and* its
     /// mirror image, to the lower triangle. For the two halves of one node's own block say each unordered pair once.
     #[inline]
     pub fn pair(&mut self, (node_a, a): (&LinearNode, usize), (node_b, b): (&LinearNode, usize), value: f64) {
-        for &(variable_a, weight_a) in &node_a.terms {
-            for &(variable_b, weight_b) in &node_b.terms {
-                let (u, v) = (variable_a + a, variable_b + b);
+        node_a.differential(a).for_each(|(u, weight_a)| {
+            node_b.differential(b).for_each(|(v, weight_b)| {
                 let value = weight_a * weight_b * value;
                 self.add(u.max(v), u.min(v), if u == v { 2.0 * value } else { value });
-            }
-        }
+            });
+        });
     }
 
     /// Adds the second derivative `value` with respect to components `a` and `b` of one and the same node, a ≥ b, once for
@@ -101,12 +98,11 @@ impl Sink<'_> {
     #[inline]
     pub fn own(&mut self, node: &LinearNode, a: usize, b: usize, value: f64) {
         if a == b {
-            for (s, &(variable_s, weight_s)) in node.terms.iter().enumerate() {
-                for &(variable_t, weight_t) in &node.terms[..=s] {
-                    let (u, v) = (variable_s + a, variable_t + a);
+            node.differential(a).enumerate().for_each(|(s, (u, weight_s))| {
+                node.differential(a).take(s + 1).for_each(|(v, weight_t)| {
                     self.add(u.max(v), u.min(v), weight_s * weight_t * value);
-                }
-            }
+                });
+            });
         } else {
             self.pair((node, a), (node, b), value);
         }
@@ -136,7 +132,7 @@ mod tests {
     /// f = (Σ w x)ᵀ A (Σ w x) has the Hessian W (A + Aᵀ) Wᵀ; said by `own`, its lower triangle.
     #[test]
     fn a_node_with_shared_variables_gives_the_whole_hessian() {
-        let node = LinearNode { terms: vec![(0, 0.25), (2, 0.75)] };
+        let node = LinearNode { terms: vec![(0, 0.25), (2, 0.75)], times: vec![] };
         let h = [[2.0, 0.5], [0.5, 3.0]];
         let say = |sink: &mut Sink| {
             for a in 0..2 {
@@ -158,5 +154,33 @@ mod tests {
             seen += 1;
         }
         assert_eq!(seen, 10);
+    }
+
+    /// ½ ‖y_1 − y_0‖² of two nodes that share a switch, variable 4, has the Hessian (∇y_1 − ∇y_0)(∇y_1 − ∇y_0)ᵀ but for the
+    /// nodes' own second derivatives.
+    #[test]
+    fn nodes_that_share_a_switch_give_the_whole_hessian() {
+        let nodes = [
+            LinearNode { terms: vec![(0, 0.5)], times: vec![(4, [2.0, -1.0, 0.0])] },
+            LinearNode { terms: vec![(2, 3.0)], times: vec![(4, [0.5, 0.25, 0.0])] },
+        ];
+        let say = |sink: &mut Sink| {
+            for d in 0..2 {
+                sink.own(&nodes[0], d, d, 1.0);
+                sink.own(&nodes[1], d, d, 1.0);
+                sink.pair((&nodes[1], d), (&nodes[0], d), -1.0);
+            }
+        };
+        let pattern = Pattern::record(say);
+        let mut values = vec![f64::NAN; pattern.len()];
+        pattern.fill(&mut values, say);
+        // Rows: components; columns: variables.
+        let gradient = [[-0.5, 0.0, 3.0, 0.0, -1.5], [0.0, -0.5, 0.0, 3.0, 1.25]];
+        for (slot, value) in values.iter().enumerate() {
+            let (i, j) = (pattern.rows[slot] as usize, pattern.columns[slot] as usize);
+            let expected: f64 = gradient.iter().map(|g| g[i] * g[j]).sum();
+            assert!((value - expected).abs() < 1e-15, "({i}, {j}): {value}, expected {expected}");
+        }
+        assert_eq!(values.len(), 11, "every place once");
     }
 }

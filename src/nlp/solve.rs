@@ -76,9 +76,6 @@ pub fn validate(scenario: &Scenario) -> Result<()> {
             "physics.law = \"newton-euler\" needs the orientation's second derivative in time, and the map is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default), or formulation = \"direct\"",
         ));
     }
-    if scenario.gait.optimize_durations {
-        return Err(Error::input("gait.optimize_durations = true is not available yet; set it to false"));
-    }
     Ok(())
 }
 
@@ -293,6 +290,8 @@ impl<'a, 'b> Run<'a, 'b> {
     fn finish(mut self, mut stage: Stage) -> Result<Motion> {
         let violations = violation::table(&mut stage.problem, &stage.x);
         self.seconds.total = self.start.elapsed().as_secs_f64();
+        // Plans are sampled from the motion as it is, at the switches that were found.
+        stage.problem.model.layout.freeze(&stage.x);
         Ok(Motion {
             solved: stage.feasible && !stage.interrupted,
             interrupted: stage.interrupted,

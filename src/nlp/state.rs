@@ -5,10 +5,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::model::Model;
 use super::sink::Sink;
 use crate::heightfield::HeightJet;
-use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::{RotationJet, skew_part};
 use crate::trajectory::space::PointJet;
+use crate::trajectory::spline::SwingBasis;
+use crate::trajectory::switches::TimedNode;
+use crate::trajectory::{Layout, LinearNode};
 use crate::warp::Order;
 
 /// The base at a sample.
@@ -48,6 +50,19 @@ impl FootNode {
     }
 }
 
+/// A point of a swing's path, wherever in time that is.
+#[derive(Clone, Debug)]
+pub struct SwingPoint {
+    /// Which swing.
+    pub swing: usize,
+    /// Share of the swing that lies before it.
+    pub u: f64,
+    /// It is the middle, where the swing is to be highest.
+    pub apex: bool,
+    /// Its variables.
+    pub node: LinearNode,
+}
+
 /// All nodes at one x.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -59,14 +74,24 @@ pub struct State {
     pub contacts: Vec<Vec<FootNode>>,
     /// `swings[foot][k]`; stale where the foot stands.
     pub swings: Vec<Vec<FootNode>>,
-    /// `apexes[foot][swing]`: the middle of each swing.
-    pub apexes: Vec<Vec<FootNode>>,
-    /// Variables of the apexes.
-    pub apex_nodes: Vec<Vec<LinearNode>>,
+    /// `points[foot]`: the middle of each swing, and where switches are variables more points of its path.
+    pub points: Vec<Vec<FootNode>>,
+    /// Which these are.
+    pub swing_points: Vec<Vec<SwingPoint>>,
     /// `warped_forces[foot][k]`, f̄ in m g.
     pub warped_forces: Vec<Vec<Vector3<f64>>>,
     /// `forces[foot][k]`, f = J f̄ in m g.
     pub forces: Vec<Vec<Vector3<f64>>>,
+    /// `warped_full_forces[foot][k]`, ḡ in m g: the variables that f̄ is a share of, see
+    /// [`crate::trajectory::switches`]. The same as f̄ where durations are given.
+    pub warped_full_forces: Vec<Vec<Vector3<f64>>>,
+    /// `full_forces[foot][k]`, J ḡ in m g.
+    pub full_forces: Vec<Vec<Vector3<f64>>>,
+    /// `switches[foot][swing]`: lift-off and touch-down, in samples.
+    pub switches: Vec<Vec<[f64; 2]>>,
+    foot_nodes: Vec<Vec<TimedNode>>,
+    force_nodes: Vec<Vec<Option<TimedNode>>>,
+    basis: SwingBasis,
 }
 
 impl State {
@@ -88,20 +113,24 @@ impl State {
         let foot = FootNode { point, ground: HeightJet::default() };
         let samples = layout.intervals + 1;
         let feet = model.feet();
+        let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(layout, i)).collect();
         Self {
             base: vec![BaseNode { point, turn }; samples],
             base_motion: vec![[[0.0; 6]; 3]; samples],
             contacts: layout.feet.iter().map(|f| vec![foot; f.stances.len()]).collect(),
             swings: vec![vec![foot; samples]; feet],
-            apexes: layout.feet.iter().map(|f| vec![foot; f.swings.len()]).collect(),
-            apex_nodes: layout
-                .feet
-                .iter()
-                .enumerate()
-                .map(|(i, f)| (0..f.swings.len()).map(|j| layout.swing_node(i, j, 0.5, 0)).collect())
-                .collect(),
+            points: swing_points.iter().map(|points| vec![foot; points.len()]).collect(),
+            swing_points,
             warped_forces: vec![vec![Vector3::zeros(); samples]; feet],
             forces: vec![vec![Vector3::zeros(); samples]; feet],
+            warped_full_forces: vec![vec![Vector3::zeros(); samples]; feet],
+            full_forces: vec![vec![Vector3::zeros(); samples]; feet],
+            switches: layout.feet.iter().map(|f| vec![[0.0; 2]; f.swings.len()]).collect(),
+            foot_nodes: (0..feet).map(|i| (0..samples).map(|k| layout.timed_foot(i, k)).collect()).collect(),
+            force_nodes: (0..feet)
+                .map(|i| (0..samples).map(|k| layout.timed_force(i, k)).collect())
+                .collect(),
+            basis: SwingBasis::new(),
         }
     }
 
@@ -120,24 +149,46 @@ impl State {
             self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
         }
         for (i, foot) in layout.feet.iter().enumerate() {
+            for (swing, times) in foot.swings.iter().zip(&mut self.switches[i]) {
+                *times = swing.times(x);
+            }
             for (stance, contact) in foot.stances.iter().zip(&mut self.contacts[i]) {
                 *contact = foot_at(&stance.foothold, order);
-                for (k, node) in stance.free_forces() {
-                    let force = Vector3::from(node.value::<3>(x));
-                    self.warped_forces[i][k] = force;
-                    self.forces[i][k] = contact.point.jacobian * force;
+                for (k, full) in stance.free_forces() {
+                    let full = Vector3::from(full.value::<3>(x));
+                    self.warped_full_forces[i][k] = full;
+                    self.full_forces[i][k] = contact.point.jacobian * full;
+                    if let Some(timed) = &mut self.force_nodes[i][k] {
+                        timed.update(&self.basis, x);
+                        let share = timed.share();
+                        self.warped_forces[i][k] = full * share;
+                        self.forces[i][k] = self.full_forces[i][k] * share;
+                    }
                 }
             }
             let order = if curved { Order::Second } else { Order::First };
-            for (k, node) in layout.foot_nodes[i].iter().enumerate() {
+            for (k, timed) in self.foot_nodes[i].iter_mut().enumerate() {
                 if let Phase::Swing(_) = layout.phase[i][k] {
-                    self.swings[i][k] = foot_at(node, order);
+                    timed.update(&self.basis, x);
+                    self.swings[i][k] = foot_at(&timed.node, order);
                 }
             }
-            for (node, apex) in self.apex_nodes[i].iter().zip(&mut self.apexes[i]) {
-                *apex = foot_at(node, order);
+            for (at, point) in self.swing_points[i].iter().zip(&mut self.points[i]) {
+                *point = foot_at(&at.node, order);
             }
         }
+    }
+
+    /// A foot at a sample in terms of the variables, at the present x.
+    pub fn foot_node(&self, foot: usize, k: usize) -> &LinearNode {
+        &self.foot_nodes[foot][k].node
+    }
+
+    /// The force f̄ of a foot at a sample in terms of the variables, at the present x, if it may bear something there, and its
+    /// stance.
+    pub fn force_node<'a>(&'a self, model: &Model, foot: usize, k: usize) -> Option<(usize, &'a LinearNode)> {
+        let (stance, _) = model.layout.force(foot, k)?;
+        self.force_nodes[foot][k].as_ref().map(|timed| (stance, &timed.node))
     }
 
     /// A foot at a sample, in stance or in swing.
@@ -147,6 +198,22 @@ impl State {
             Phase::Swing(_) => &self.swings[foot][k],
         }
     }
+}
+
+/// The middle of each swing; where its switches are variables, also points where the samples would be at nominal times.
+pub(crate) fn swing_points(layout: &Layout, foot: usize) -> Vec<SwingPoint> {
+    let mut points = Vec::new();
+    for (swing, variables) in layout.feet[foot].swings.iter().enumerate() {
+        let mut add = |u: f64, apex: bool| {
+            points.push(SwingPoint { swing, u, apex, node: layout.swing_node(foot, swing, u, 0) });
+        };
+        add(0.5, true);
+        if variables.switches.is_some() {
+            let samples = (variables.swing.end - variables.swing.start) as usize;
+            (1..samples).for_each(|k| add(k as f64 / samples as f64, false));
+        }
+    }
+    points
 }
 
 /// ∂L/∂(ambient quantities) of a Lagrangian term: the weights of the nodes' own second derivatives.
@@ -160,10 +227,14 @@ pub struct Curvature {
     pub contacts: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂p_i, `[foot][k]`.
     pub swings: Vec<Vec<Vector3<f64>>>,
-    /// ∂L/∂p_i, `[foot][swing]`.
-    pub apexes: Vec<Vec<Vector3<f64>>>,
+    /// ∂L/∂p_i, `[foot]` and as in [`State::points`].
+    pub points: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂f_i, `[foot][k]`.
     pub forces: Vec<Vec<Vector3<f64>>>,
+    /// ∂L/∂(J ḡ_i), `[foot][k]`.
+    pub full_forces: Vec<Vec<Vector3<f64>>>,
+    /// ∂L/∂f̄_i beyond what goes through f_i, `[foot][k]`.
+    pub warped_forces: Vec<Vec<Vector3<f64>>>,
 }
 
 impl Curvature {
@@ -175,8 +246,10 @@ impl Curvature {
             base_rotation: vec![Matrix3::zeros(); state.base.len()],
             contacts: zeros(&state.contacts),
             swings: zeros(&state.swings),
-            apexes: zeros(&state.apexes),
+            points: zeros(&state.points),
             forces: state.forces.clone(),
+            full_forces: state.forces.clone(),
+            warped_forces: state.forces.clone(),
         }
     }
 
@@ -184,7 +257,14 @@ impl Curvature {
     pub fn clear(&mut self) {
         self.base_position.fill(Vector3::zeros());
         self.base_rotation.fill(Matrix3::zeros());
-        for list in [&mut self.contacts, &mut self.swings, &mut self.apexes, &mut self.forces] {
+        for list in [
+            &mut self.contacts,
+            &mut self.swings,
+            &mut self.points,
+            &mut self.forces,
+            &mut self.full_forces,
+            &mut self.warped_forces,
+        ] {
             for foot in list {
                 foot.fill(Vector3::zeros());
             }
@@ -220,9 +300,15 @@ impl Curvature {
                 }
             }
         }
-        if !model.space.is_warped() {
-            return;
+        self.say_switches(model, state, sink);
+        if model.space.is_warped() {
+            self.say_feet(model, state, sink);
         }
+    }
+
+    /// The part of the feet and forces that is due to φ.
+    fn say_feet(&self, model: &Model, state: &State, sink: &mut Sink) {
+        let layout = &model.layout;
         let position = |sink: &mut Sink, node: &LinearNode, point: &PointJet, weight: &Vector3<f64>| {
             for d in 0..3 {
                 for e in 0..=d {
@@ -237,15 +323,25 @@ impl Curvature {
                 position(sink, foothold, point, &self.contacts[i][j]);
                 // f = J(c̄) f̄: ∂²f/∂c̄∂f̄ = ∂J, ∂²f/∂c̄² = ∂²J f̄, the latter summed over the stance's samples first.
                 let mut total = Matrix3::zeros();
-                for (k, force) in stance.free_forces() {
-                    let weight = self.forces[i][k];
-                    for e in 0..3 {
-                        let row = point.first[e].transpose() * weight;
-                        for d in 0..3 {
-                            sink.pair((foothold, e), (force, d), row[d]);
-                            total[(e, d)] += weight.dot(&(point.second[e][d] * state.warped_forces[i][k]));
+                let mut force =
+                    |sink: &mut Sink, node: &LinearNode, warped: &Vector3<f64>, weight: &Vector3<f64>| {
+                        for e in 0..3 {
+                            let row = point.first[e].transpose() * weight;
+                            for d in 0..3 {
+                                sink.pair((foothold, e), (node, d), row[d]);
+                                total[(e, d)] += weight.dot(&(point.second[e][d] * warped));
+                            }
                         }
+                    };
+                for (k, full) in stance.free_forces() {
+                    let Some(timed) = &state.force_nodes[i][k] else { continue };
+                    let (mut weight, full_weight) = (self.forces[i][k], &self.full_forces[i][k]);
+                    if timed.is_timed() {
+                        force(sink, full, &state.warped_full_forces[i][k], full_weight);
+                    } else {
+                        weight += full_weight;
                     }
+                    force(sink, &timed.node, &state.warped_forces[i][k], &weight);
                 }
                 for d in 0..3 {
                     for e in 0..=d {
@@ -253,14 +349,48 @@ impl Curvature {
                     }
                 }
             }
-            for (k, node) in layout.foot_nodes[i].iter().enumerate() {
+            for (k, timed) in state.foot_nodes[i].iter().enumerate() {
                 if let Phase::Swing(_) = layout.phase[i][k] {
-                    position(sink, node, &state.swings[i][k].point, &self.swings[i][k]);
+                    position(sink, &timed.node, &state.swings[i][k].point, &self.swings[i][k]);
                 }
             }
-            for (j, node) in state.apex_nodes[i].iter().enumerate() {
-                position(sink, node, &state.apexes[i][j].point, &self.apexes[i][j]);
+            for (n, at) in state.swing_points[i].iter().enumerate() {
+                position(sink, &at.node, &state.points[i][n].point, &self.points[i][n]);
             }
+        }
+    }
+
+    /// The part that is due to nodes whose weights depend on switches.
+    fn say_switches(&self, model: &Model, state: &State, sink: &mut Sink) {
+        let layout = &model.layout;
+        for i in 0..layout.feet.len() {
+            for (k, timed) in state.foot_nodes[i].iter().enumerate().filter(|(_, t)| t.is_timed()) {
+                let weight = state.swings[i][k].point.jacobian.tr_mul(&self.swings[i][k]);
+                say_timed(timed, &weight, sink);
+            }
+            for (k, timed) in state.force_nodes[i].iter().enumerate() {
+                let Some(timed) = timed.as_ref().filter(|t| t.is_timed()) else { continue };
+                let Some((j, _)) = layout.force(i, k) else { continue };
+                let jacobian = &state.contacts[i][j].point.jacobian;
+                let weight = jacobian.tr_mul(&self.forces[i][k]) + self.warped_forces[i][k];
+                say_timed(timed, &weight, sink);
+            }
+        }
+    }
+}
+
+/// Says weight · ∂²y of a node y whose weights depend on switches.
+fn say_timed(timed: &TimedNode, weight: &Vector3<f64>, sink: &mut Sink) {
+    for (t, &(switch, _)) in timed.node.times.iter().enumerate() {
+        for (m, &(variable, _)) in timed.node.terms.iter().enumerate() {
+            for d in 0..3 {
+                let v = variable + d;
+                sink.add(v.max(switch), v.min(switch), weight[d] * timed.mixed[m][t]);
+            }
+        }
+        for (s, &(other, _)) in timed.node.times[..=t].iter().enumerate() {
+            let second = Vector3::from(timed.second[t + s]);
+            sink.add(switch.max(other), switch.min(other), weight.dot(&second));
         }
     }
 }

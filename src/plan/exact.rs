@@ -6,6 +6,7 @@ use crate::trajectory::gait::{Gait, Swing};
 use crate::trajectory::layout::Layout;
 use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
 use crate::trajectory::space::Space;
+use crate::trajectory::switches::snapped;
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
@@ -186,7 +187,7 @@ impl Plan {
     }
 }
 
-/// The swings of a foot from its phase durations, whose ends lie on samples.
+/// The swings of a foot from its phase durations, s.
 fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Result<Vec<Swing>> {
     let refuse = |what: String| Err(Error::input(format!("member phase_durations of {foot}: {what}")));
     if durations.len().is_multiple_of(2) {
@@ -195,25 +196,22 @@ fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Re
             durations.len()
         ));
     }
-    let mut edges = vec![0];
+    let mut edges = vec![0.0];
     let mut time = 0.0;
     for duration in durations {
         time += duration;
-        let k = (time / time_step).round();
-        if !((time / time_step - k).abs() < 1e-3
-            && k > edges[edges.len() - 1] as f64
-            && k <= intervals as f64)
-        {
+        let k = snapped(time / time_step);
+        if !(k > edges[edges.len() - 1] && k <= intervals as f64) {
             return refuse(format!(
-                "a switch at {time} s is not on a later sample of {time_step} s within the plan"
+                "a switch at {time} s is not after the one before it and within the plan"
             ));
         }
-        edges.push(k as usize);
+        edges.push(k);
     }
-    if edges[durations.len()] != intervals {
+    if edges[durations.len()] != intervals as f64 {
         return refuse(format!("they end at {time} s, the base at {} s", intervals as f64 * time_step));
     }
-    Ok((1..durations.len()).step_by(2).map(|j| Swing { start: edges[j], end: edges[j + 1] }).collect())
+    Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
 }
 
 fn wrong(member: &str, what: impl std::fmt::Display) -> Error {

@@ -90,9 +90,9 @@ impl Plan {
             .feet
             .iter()
             .map(|foot| {
-                let edges: Vec<usize> =
+                let edges: Vec<f64> =
                     foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
-                edges.windows(2).map(|e| (e[1] - e[0]) as f64 * step).collect()
+                edges.windows(2).map(|e| (e[1] - e[0]) * step).collect()
             })
             .collect();
         let history =

@@ -118,6 +118,15 @@ fn gait(document: &Document, scenario: &Scenario) -> Result<()> {
         let what = format!("given [{least}, {most}], allowed: the least before the greatest duration, in s");
         return Err(document.error("gait.duration_bounds", what));
     }
+    if gait.optimize_durations && gait.kind == GaitKind::Stand {
+        let what =
+            "given true, but kind = \"stand\" has no steps whose durations could be found; set it to false";
+        return Err(document.error("gait.optimize_durations", what));
+    }
+    if gait.optimize_durations && scenario.discretization.force_knots > 1 {
+        let what = "given true, but discretization.force_knots is not 1; forces follow the switches sample by sample, so set that to 1 or this to false";
+        return Err(document.error("gait.optimize_durations", what));
+    }
     match (&gait.phases, gait.kind) {
         (None, GaitKind::Custom) => {
             let what =

@@ -1,6 +1,8 @@
-//! Which foot stands when. Switches lie on the grid of samples, so that piecewise linear forces have their kinks where
-//! the base's acceleration has its own.
+//! Which foot stands when. Nominal switches lie on the grid of samples, so that piecewise linear forces have their kinks
+//! where the base's acceleration has its own. With `gait.optimize_durations` they may leave it, each within a room of its
+//! own; see [`super::switches`].
 
+use super::switches;
 use crate::scenario::{GaitKind, Scenario};
 use crate::{Error, Result};
 
@@ -8,25 +10,49 @@ use crate::{Error, Result};
 const STAND: f64 = 0.3;
 
 /// A time during which a foot stands, in samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {
-    /// First sample, touch-down (force zero, unless the motion starts here).
-    pub start: usize,
-    /// Last sample, lift-off (force zero, unless the motion ends here).
-    pub end: usize,
+    /// Touch-down (force zero, unless the motion starts here).
+    pub start: f64,
+    /// Lift-off (force zero, unless the motion ends here).
+    pub end: f64,
 }
 
 /// A time during which a foot moves, in samples; both ends belong to a stance as well.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
     /// Lift-off.
-    pub start: usize,
+    pub start: f64,
     /// Touch-down.
-    pub end: usize,
+    pub end: f64,
+    /// How far lift-off and touch-down may move to either side; zero where they are given.
+    pub room: [f64; 2],
+}
+
+impl Swing {
+    /// With given ends.
+    pub fn given(start: f64, end: f64) -> Self {
+        Self { start, end, room: [0.0; 2] }
+    }
+
+    /// Whether its ends are variables.
+    pub fn is_free(&self) -> bool {
+        self.room != [0.0; 2]
+    }
+
+    /// The samples at which the foot moves, or may move, lie strictly between these.
+    pub fn span(&self) -> [f64; 2] {
+        [self.start - self.room[0], self.end + self.room[1]]
+    }
+
+    /// Time between its nominal ends; forces before it belong to the stance before.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.start + self.end)
+    }
 }
 
 /// Swings by foot, in order of time.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Gait {
     /// Intervals of the sample grid.
     pub intervals: usize,
@@ -42,7 +68,7 @@ impl Gait {
         let intervals = (scenario.horizon / step).round() as usize;
         let gait = &scenario.gait;
         let feet = foot_names.len();
-        let swings = match gait.kind {
+        let mut swings = match gait.kind {
             GaitKind::Stand => vec![Vec::new(); feet],
             GaitKind::Custom => custom(gait.phases.as_deref(), feet, step, intervals)?,
             kind => {
@@ -51,6 +77,12 @@ impl Gait {
                 cyclic(&offsets, duty, gait.cycle.unwrap_or(cycle), scenario.horizon, step)?
             }
         };
+        if gait.optimize_durations {
+            for (swings, name) in swings.iter_mut().zip(foot_names) {
+                switches::make_room(swings, intervals, step, gait.duration_bounds)
+                    .map_err(|what| Error::input(format!("gait.optimize_durations: foot {name}: {what}")))?;
+            }
+        }
         Ok(Self { intervals, swings })
     }
 
@@ -59,15 +91,15 @@ impl Gait {
         let swings = &self.swings[foot];
         (0..=swings.len())
             .map(|j| Stance {
-                start: if j == 0 { 0 } else { swings[j - 1].end },
-                end: if j == swings.len() { self.intervals } else { swings[j].start },
+                start: if j == 0 { 0.0 } else { swings[j - 1].end },
+                end: if j == swings.len() { self.intervals as f64 } else { swings[j].start },
             })
             .collect()
     }
 
-    /// The swing that sample `k` lies strictly inside of, if any.
+    /// The swing that sample `k` lies strictly inside of, or may lie inside of, if any.
     pub fn swing_at(&self, foot: usize, k: usize) -> Option<usize> {
-        self.swings[foot].iter().position(|s| s.start < k && k < s.end)
+        self.swings[foot].iter().position(|s| s.span()[0] < k as f64 && (k as f64) < s.span()[1])
     }
 }
 
@@ -97,8 +129,8 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
 
 /// As many whole cycles as fit between standing at the start and at the end; what is left is standing too.
 fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Result<Vec<Vec<Swing>>> {
-    let swing = ((1.0 - duty) * cycle / step).round() as usize;
-    if swing < 2 {
+    let swing = ((1.0 - duty) * cycle / step).round();
+    if swing < 2.0 {
         return Err(Error::input(format!(
             "gait: a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, lower the duty or the time_step",
             (1.0 - duty) * cycle
@@ -118,8 +150,8 @@ fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Re
         .map(|offset| {
             (0..cycles as usize)
                 .map(|j| {
-                    let start = ((begin + (j as f64 + offset) * cycle) / step).round() as usize;
-                    Swing { start, end: start + swing }
+                    let start = ((begin + (j as f64 + offset) * cycle) / step).round();
+                    Swing::given(start, start + swing)
                 })
                 .collect()
         })
@@ -147,27 +179,27 @@ fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize)
                     durations.len()
                 )));
             }
-            let mut edges = vec![0_usize];
+            let mut edges = vec![0.0];
             let mut time = 0.0;
             for d in durations {
                 time += d;
-                edges.push((time / step).round() as usize);
+                edges.push((time / step).round());
             }
-            if edges[durations.len()] != intervals {
+            if edges[durations.len()] != intervals as f64 {
                 return Err(Error::input(format!(
                     "gait.phases[{foot}]: the durations sum to {time} s, but the horizon is {} s",
                     intervals as f64 * step
                 )));
             }
             for (j, pair) in edges.windows(2).enumerate() {
-                if pair[1] < pair[0] + 2 {
+                if pair[1] < pair[0] + 2.0 {
                     return Err(Error::input(format!(
                         "gait.phases[{foot}][{j}]: {} s is shorter than two time steps of {step} s",
                         durations[j]
                     )));
                 }
             }
-            Ok((1..durations.len()).step_by(2).map(|j| Swing { start: edges[j], end: edges[j + 1] }).collect())
+            Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
         })
         .collect()
 }
@@ -198,7 +230,7 @@ mod tests {
                 assert_eq!(up, 0);
             }
         }
-        assert!(gait.swings.iter().all(|s| s.len() == 9 && s.iter().all(|s| s.end - s.start == 5)));
+        assert!(gait.swings.iter().all(|s| s.len() == 9 && s.iter().all(|s| s.end - s.start == 5.0)));
     }
 
     #[test]
@@ -214,8 +246,8 @@ mod tests {
     fn a_custom_table_must_fill_the_horizon() {
         let ok = "[gait]\nkind = \"custom\"\nphases = [[5.0, 0.5, 4.5], [10.0], [10.0], [10.0]]";
         let gait = Gait::new(&scenario(ok), &names(), 1.0).expect("a gait");
-        assert_eq!(gait.swings[0], [Swing { start: 100, end: 110 }]);
-        assert_eq!(gait.stances(0), [Stance { start: 0, end: 100 }, Stance { start: 110, end: 200 }]);
+        assert_eq!(gait.swings[0], [Swing::given(100.0, 110.0)]);
+        assert_eq!(gait.stances(0), [Stance { start: 0.0, end: 100.0 }, Stance { start: 110.0, end: 200.0 }]);
         let short = ok.replace("4.5", "4.0");
         assert!(Gait::new(&scenario(&short), &names(), 1.0).unwrap_err().to_string().contains("horizon"));
     }

@@ -6,24 +6,32 @@
 //! | footholds | (x̄, ȳ, z̄) for each stance |
 //! | swings | three inner control points of a clamped cubic B-spline; its outer two on each side are the footholds, so that feet leave and land with zero velocity |
 //! | forces | f̄ at every sample of a stance (or, coarser, at about every n-th) but the switches, where it is zero; linear in between |
+//! | switches | lift-off and touch-down of each swing in samples, where durations are optimized; see [`super::switches`] |
 //!
 //! The base's acceleration is (nearly) piecewise linear on the same grid as the forces, and so Newton's law can hold
 //! between the samples as well as at them. Coarser knots are there to measure what that is worth ([`KnotSpacing`]).
 
+use std::ops::Range;
+
 use super::gait::{Gait, Stance, Swing};
 use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
+use super::switches::{self, TimedNode};
 
 /// A sampled quantity: component d is the sum of `weight * x[variable + d]` over the terms.
+///
+/// Where the weights depend on switches, `times` holds what the node's differential has besides the terms.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinearNode {
     /// (first variable, weight).
     pub terms: Vec<(usize, f64)>,
+    /// (switch, derivative of each of the three components with respect to it).
+    pub times: Vec<(usize, [f64; 3])>,
 }
 
 impl LinearNode {
     /// A node that is a variable itself.
     pub fn variable(variable: usize) -> Self {
-        Self { terms: vec![(variable, 1.0)] }
+        Self { terms: vec![(variable, 1.0)], times: Vec::new() }
     }
 
     /// Its first variable; of a node that is a variable itself, that variable.
@@ -40,6 +48,12 @@ impl LinearNode {
             }
         }
         y
+    }
+
+    /// The differential of component d: (variable, coefficient).
+    pub fn differential(&self, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let terms = self.terms.iter().map(move |&(variable, weight)| (variable + d, weight));
+        terms.chain(self.times.iter().map(move |&(variable, by)| (variable, by[d])))
     }
 
     /// Adds a variable's share.
@@ -75,17 +89,22 @@ pub struct StanceVariables {
     pub stance: Stance,
     /// The foothold, three components.
     pub foothold: LinearNode,
-    /// f̄ at each sample from `stance.start` to `stance.end`, three components; none where it is tied to zero.
-    pub forces: Vec<Option<LinearNode>>,
+    /// The first sample with a force.
+    pub first_force: usize,
+    /// f̄ at the samples from there on, three components: all at which the foot may bear something. Where durations are
+    /// optimized, ḡ.
+    pub forces: Vec<LinearNode>,
 }
 
 impl StanceVariables {
     /// The samples with a free force, and its node.
     pub fn free_forces(&self) -> impl Iterator<Item = (usize, &LinearNode)> + '_ {
-        self.forces
-            .iter()
-            .enumerate()
-            .filter_map(|(j, node)| node.as_ref().map(|node| (self.stance.start + j, node)))
+        self.forces.iter().enumerate().map(|(n, node)| (self.first_force + n, node))
+    }
+
+    /// The force at sample k, if it is free there.
+    pub fn force(&self, k: usize) -> Option<&LinearNode> {
+        self.forces.get(k.checked_sub(self.first_force)?)
     }
 }
 
@@ -96,6 +115,15 @@ pub struct SwingVariables {
     pub swing: Swing,
     /// First of the nine variables of the inner control points.
     pub control_points: usize,
+    /// The variable that is the lift-off; the next one is the touch-down. None where they are given.
+    pub switches: Option<usize>,
+}
+
+impl SwingVariables {
+    /// Lift-off and touch-down at x, in samples.
+    pub fn times(&self, x: &[f64]) -> [f64; 2] {
+        self.switches.map_or([self.swing.start, self.swing.end], |v| [x[v], x[v + 1]])
+    }
 }
 
 /// The variables of one foot.
@@ -112,7 +140,7 @@ pub struct FootVariables {
 pub enum Phase {
     /// Stands, in this stance. At a switch the foot counts as standing.
     Stance(usize),
-    /// Moves, in this swing.
+    /// Moves, in this swing; or may move, where its switches are variables.
     Swing(usize),
 }
 
@@ -137,8 +165,8 @@ pub struct Layout {
     pub feet: Vec<FootVariables>,
     /// `phase[foot][k]`.
     pub phase: Vec<Vec<Phase>>,
-    /// `foot_nodes[foot][k]`, three components.
-    pub foot_nodes: Vec<Vec<LinearNode>>,
+    /// `nearest_stance[foot][k]`: the stance that a force at a sample belongs to.
+    nearest_stance: Vec<Vec<usize>>,
 }
 
 impl Layout {
@@ -162,7 +190,7 @@ impl Layout {
             base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
-            foot_nodes: Vec::new(),
+            nearest_stance: Vec::new(),
         };
         layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
         layout.base_rates = (0..=intervals)
@@ -181,53 +209,98 @@ impl Layout {
     }
 
     fn add_foot(&mut self, gait: &Gait, foot: usize, spacing: usize) {
-        let intervals = self.intervals;
-        let stances = gait
+        let nominal = &gait.swings[foot];
+        let stances: Vec<StanceVariables> = gait
             .stances(foot)
             .into_iter()
-            .map(|stance| StanceVariables {
-                stance,
-                foothold: LinearNode::variable(self.take(3)),
-                forces: self.force_nodes(stance, spacing),
+            .enumerate()
+            .map(|(j, stance)| {
+                let samples =
+                    force_samples(j.checked_sub(1).map(|j| &nominal[j]), nominal.get(j), self.intervals);
+                StanceVariables {
+                    stance,
+                    foothold: LinearNode::variable(self.take(3)),
+                    first_force: samples.start,
+                    forces: self.force_nodes(stance, samples, spacing),
+                }
             })
             .collect();
-        let swings = gait.swings[foot]
+        let swings: Vec<SwingVariables> = nominal
             .iter()
-            .map(|&swing| SwingVariables { swing, control_points: self.take(3 * SWING_CONTROL_POINTS) })
-            .collect();
-        let variables = FootVariables { stances, swings };
-        let phase: Vec<Phase> = (0..=intervals)
-            .map(|k| match gait.swing_at(foot, k) {
-                Some(j) => Phase::Swing(j),
-                None => Phase::Stance(
-                    variables
-                        .stances
-                        .iter()
-                        .rposition(|s| s.stance.start <= k)
-                        .expect("the first stance starts at 0"),
-                ),
+            .map(|&swing| SwingVariables {
+                swing,
+                control_points: self.take(3 * SWING_CONTROL_POINTS),
+                switches: swing.is_free().then(|| self.take(2)),
             })
             .collect();
-        self.feet.push(variables);
-        self.phase.push(phase);
-        let nodes = (0..=intervals).map(|k| self.foot_node(foot, k as f64, 0)).collect();
-        self.foot_nodes.push(nodes);
+        self.feet.push(FootVariables { stances, swings });
+        self.phase.push(Vec::new());
+        self.nearest_stance.push(Vec::new());
+        self.set_phases(foot);
     }
 
-    /// The force at each sample of a stance: its own variables, or between those of two coarser nodes; none where it is tied
-    /// to zero.
-    fn force_nodes(&mut self, stance: Stance, spacing: usize) -> Vec<Option<LinearNode>> {
+    fn set_phases(&mut self, foot: usize) {
+        let swings = &self.feet[foot].swings;
+        let samples = 0..=self.intervals;
+        self.nearest_stance[foot] =
+            samples.clone().map(|k| swings.iter().filter(|s| s.swing.middle() < k as f64).count()).collect();
+        self.phase[foot] = samples
+            .map(|k| {
+                let within = |[start, end]: [f64; 2]| start < k as f64 && (k as f64) < end;
+                match swings.iter().position(|s| within(s.swing.span())) {
+                    Some(j) => Phase::Swing(j),
+                    None => Phase::Stance(self.nearest_stance[foot][k]),
+                }
+            })
+            .collect();
+    }
+
+    /// Takes the switches from x for good: from now on phases, feet and forces are those of the motion x.
+    pub fn freeze(&mut self, x: &[f64]) {
+        for foot in 0..self.feet.len() {
+            let FootVariables { stances, swings } = &mut self.feet[foot];
+            for (j, swing) in swings.iter_mut().enumerate().filter(|(_, s)| s.switches.is_some()) {
+                let [start, end] = swing.times(x).map(switches::snapped);
+                swing.swing = Swing::given(start, end);
+                stances[j].stance.end = start;
+                stances[j + 1].stance.start = end;
+                swing.switches = None;
+                let before = stances[j].first_force;
+                for (n, node) in stances[j].forces.iter_mut().enumerate() {
+                    node.terms[0].1 *= switches::share(before + n, None, Some(start));
+                }
+                let after = stances[j + 1].first_force;
+                for (n, node) in stances[j + 1].forces.iter_mut().enumerate() {
+                    node.terms[0].1 *= switches::share(after + n, Some(end), None);
+                }
+            }
+            self.set_phases(foot);
+        }
+    }
+
+    /// Whether there are switches among the variables.
+    pub fn has_switches(&self) -> bool {
+        self.feet.iter().flat_map(|f| &f.swings).any(|s| s.switches.is_some())
+    }
+
+    /// The forces at some samples of a stance: their own variables, or between those of two coarser nodes of which the ones at
+    /// switches are tied to zero.
+    fn force_nodes(&mut self, stance: Stance, samples: Range<usize>, spacing: usize) -> Vec<LinearNode> {
+        if spacing == 1 {
+            return samples.map(|_| LinearNode::variable(self.take(3))).collect();
+        }
         let length = stance.end - stance.start;
-        let pieces = pieces(length, spacing);
+        let pieces = pieces(length as usize, spacing);
         let nodes: Vec<Option<usize>> = (0..=pieces)
             .map(|a| {
-                let tied = (a == 0 && stance.start > 0) || (a == pieces && stance.end < self.intervals);
+                let tied =
+                    (a == 0 && stance.start > 0.0) || (a == pieces && stance.end < self.intervals as f64);
                 (!tied).then(|| self.take(3))
             })
             .collect();
-        (0..=length)
-            .map(|j| {
-                let at = (j * pieces) as f64 / length as f64;
+        samples
+            .map(|k| {
+                let at = (k as f64 - stance.start) * pieces as f64 / length;
                 let before = (at as usize).min(pieces - 1);
                 let share = at - before as f64;
                 let mut node = LinearNode::default();
@@ -236,8 +309,9 @@ impl Layout {
                         node.push(variable, weight);
                     }
                 }
-                (!node.terms.is_empty()).then_some(node)
+                node
             })
+            .filter(|node| !node.terms.is_empty())
             .collect()
     }
 
@@ -265,49 +339,93 @@ impl Layout {
         node
     }
 
-    /// A foot at time `k` in samples: its position, velocity or acceleration (in the space of the variables).
+    /// A foot at time `k` in samples: its position, velocity or acceleration (in the space of the variables), with switches
+    /// at their nominal or frozen times.
     pub fn foot_node(&self, foot: usize, k: f64, derivative: usize) -> LinearNode {
         let variables = &self.feet[foot];
-        let swing =
-            variables.swings.iter().position(|s| (s.swing.start as f64) < k && k < s.swing.end as f64);
+        let swing = variables.swings.iter().position(|s| s.swing.start < k && k < s.swing.end);
         if let Some(j) = swing {
             let s = variables.swings[j].swing;
-            let duration = (s.end - s.start) as f64;
-            return self.swing_node(foot, j, (k - s.start as f64) / duration, derivative);
+            let duration = s.end - s.start;
+            let mut node = self.swing_node(foot, j, (k - s.start) / duration, derivative);
+            let scale = (duration * self.time_step).powi(-(derivative as i32));
+            node.terms.iter_mut().for_each(|term| term.1 *= scale);
+            return node;
         }
         if derivative > 0 {
             return LinearNode::default();
         }
-        let stance = variables.stances.iter().rev().find(|s| s.stance.start as f64 <= k + 1e-12);
-        stance.expect("the first stance starts at 0").foothold.clone()
+        let stance = variables.swings.iter().filter(|s| s.swing.middle() < k).count();
+        variables.stances[stance].foothold.clone()
     }
 
-    /// A foot in swing `j` at u ∈ [0, 1] of it.
+    /// A foot at u ∈ [0, 1] of swing `j`, or a derivative with respect to u.
     pub fn swing_node(&self, foot: usize, j: usize, u: f64, derivative: usize) -> LinearNode {
-        let variables = &self.feet[foot];
-        let s = &variables.swings[j];
-        let duration = (s.swing.end - s.swing.start) as f64 * self.time_step;
         let weights = &clamped_cubic(SWING_INTERVALS, u)[derivative];
-        let scale = duration.powi(-(derivative as i32));
+        let variables = self.swing_variables(foot, j);
         let mut node = LinearNode::default();
-        for (c, weight) in weights.iter().enumerate() {
-            let variable = match c {
-                0 | 1 => variables.stances[j].foothold.first(),
-                c if c < 2 + SWING_CONTROL_POINTS => s.control_points + 3 * (c - 2),
-                _ => variables.stances[j + 1].foothold.first(),
-            };
-            node.push(variable, weight * scale);
+        for (c, &weight) in weights.iter().enumerate() {
+            node.push(variables[c.clamp(1, SWING_CONTROL_POINTS + 2) - 1], weight);
         }
         node
     }
 
-    /// The force of a foot at sample `k`, if it is free there, and its stance.
-    pub fn force(&self, foot: usize, k: usize) -> Option<(usize, &LinearNode)> {
-        let Phase::Stance(j) = self.phase[foot][k] else { return None };
-        // At a touch-down the later stance is meant, whose force is zero there; so is that of the earlier one.
-        let stance = &self.feet[foot].stances[j];
-        stance.forces[k - stance.stance.start].as_ref().map(|node| (j, node))
+    /// First variables of a swing's foothold, control points and next foothold.
+    fn swing_variables(&self, foot: usize, j: usize) -> [usize; SWING_CONTROL_POINTS + 2] {
+        let variables = &self.feet[foot];
+        let first = variables.swings[j].control_points;
+        std::array::from_fn(|c| match c {
+            0 => variables.stances[j].foothold.first(),
+            c if c <= SWING_CONTROL_POINTS => first + 3 * (c - 1),
+            _ => variables.stances[j + 1].foothold.first(),
+        })
     }
+
+    /// A foot at sample `k`, following its switches where these are variables.
+    pub fn timed_foot(&self, foot: usize, k: usize) -> TimedNode {
+        if let Phase::Swing(j) = self.phase[foot][k]
+            && let Some(lift_off) = self.feet[foot].swings[j].switches
+        {
+            return TimedNode::moving(k, self.swing_variables(foot, j), lift_off);
+        }
+        TimedNode::given(self.foot_node(foot, k as f64, 0))
+    }
+
+    /// The force f̄ of a foot at sample `k`, if it may bear something there, following its switches where these are variables.
+    pub fn timed_force(&self, foot: usize, k: usize) -> Option<TimedNode> {
+        let (j, full) = self.force(foot, k)?;
+        let swings = &self.feet[foot].swings;
+        // A ramp takes one sample, from the switch to two samples from it.
+        let before = j.checked_sub(1).map(|j| &swings[j]).filter(|s| (k as f64) < s.swing.span()[1] + 2.0);
+        let after = swings.get(j).filter(|s| (k as f64) > s.swing.span()[0] - 2.0);
+        Some(match (before.and_then(|s| s.switches), after.and_then(|s| s.switches)) {
+            (Some(switches), _) => TimedNode::rising(k, full.first(), switches + 1),
+            (None, Some(switches)) => TimedNode::falling(k, full.first(), switches),
+            (None, None) => TimedNode::given(full.clone()),
+        })
+    }
+
+    /// The force of a foot at sample `k`, if it is free there, and its stance. Where durations are optimized, ḡ.
+    pub fn force(&self, foot: usize, k: usize) -> Option<(usize, &LinearNode)> {
+        let j = self.nearest_stance[foot][k];
+        self.feet[foot].stances[j].force(k).map(|node| (j, node))
+    }
+}
+
+/// The samples of a stance between two swings at which the foot may bear something: a force acts from the sample before to the
+/// sample after, all of which must lie within the stance.
+fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize) -> Range<usize> {
+    let first = before.map_or(0.0, |s| {
+        // At the very end of its room a switch leaves no force there.
+        let earliest = s.end - s.room[1] + 1.0;
+        if s.is_free() { earliest.floor() + 1.0 } else { earliest.ceil() }
+    });
+    let last = after.map_or(intervals as f64, |s| {
+        let latest = s.start + s.room[0] - 1.0;
+        if s.is_free() { latest.ceil() - 1.0 } else { latest.floor() }
+    });
+    let first = first as usize;
+    first..((last + 1.0).max(0.0) as usize).max(first)
 }
 
 /// How many pieces of about `spacing` samples make up `length`.
@@ -326,12 +444,7 @@ mod tests {
     fn layout_of(spacing: KnotSpacing) -> Layout {
         let gait = Gait {
             intervals: 20,
-            swings: vec![
-                vec![Swing { start: 4, end: 8 }],
-                vec![Swing { start: 10, end: 15 }],
-                vec![],
-                vec![],
-            ],
+            swings: vec![vec![Swing::given(4.0, 8.0)], vec![Swing::given(10.0, 15.0)], vec![], vec![]],
         };
         Layout::new(&gait, 0.05, spacing)
     }
@@ -343,11 +456,11 @@ mod tests {
         // 20 samples in 7 intervals of the base; the stance of 4 samples has nodes at 0, 2 and, tied to zero, 4.
         assert_eq!((layout.base_intervals, layout.base_blocks), (7, 6));
         let stance = &layout.feet[0].stances[0];
-        let first = stance.forces[0].as_ref().expect("the motion starts here").first();
-        let second = stance.forces[2].as_ref().expect("inside").first();
-        assert_eq!(stance.forces[1].as_ref().expect("inside").terms, [(first, 0.5), (second, 0.5)]);
-        assert_eq!(stance.forces[3].as_ref().expect("inside").terms, [(second, 0.5)]);
-        assert!(stance.forces[4].is_none());
+        let first = stance.force(0).expect("the motion starts here").first();
+        let second = stance.force(2).expect("inside").first();
+        assert_eq!(stance.force(1).expect("inside").terms, [(first, 0.5), (second, 0.5)]);
+        assert_eq!(stance.force(3).expect("inside").terms, [(second, 0.5)]);
+        assert!(stance.force(4).is_none());
         // A spline whose control points lie on a line is that line; its derivative is the slope.
         let mut x = vec![0.0; layout.variables];
         for block in 0..layout.base_blocks {
@@ -384,7 +497,7 @@ mod tests {
         }
         for foot in 0..4 {
             for k in 0..=20 {
-                for &(v, _) in &layout.foot_nodes[foot][k].terms {
+                for &(v, _) in &layout.foot_node(foot, k as f64, 0).terms {
                     for d in 0..3 {
                         used[v + d] |= 2;
                     }
@@ -415,7 +528,7 @@ mod tests {
         let foot = &layout.feet[1];
         assert_eq!(layout.swing_node(1, 0, 0.0, 0).terms, [(foot.stances[0].foothold.first(), 1.0)]);
         assert_eq!(layout.swing_node(1, 0, 1.0, 0).terms, [(foot.stances[1].foothold.first(), 1.0)]);
-        assert_eq!(layout.foot_nodes[1][10].terms, [(foot.stances[0].foothold.first(), 1.0)]);
-        assert_eq!(layout.foot_nodes[1][15].terms, [(foot.stances[1].foothold.first(), 1.0)]);
+        assert_eq!(layout.foot_node(1, 10.0, 0).terms, [(foot.stances[0].foothold.first(), 1.0)]);
+        assert_eq!(layout.foot_node(1, 15.0, 0).terms, [(foot.stances[1].foothold.first(), 1.0)]);
     }
 }

@@ -9,6 +9,7 @@ pub mod rotation;
 pub mod sampling;
 pub mod space;
 pub mod spline;
+pub mod switches;
 
 pub use gait::{Gait, Stance, Swing};
 pub use layout::{Layout, LinearNode};

@@ -94,14 +94,14 @@ pub fn base(layout: &Layout, space: &Space, x: &[f64], k: f64) -> BaseMotion {
     }
 }
 
-/// A foot at time `k` in samples. Forces are linear between samples.
+/// A foot at time `k` in samples, switches given or frozen. Forces are linear between samples.
 pub fn foot(layout: &Layout, space: &Space, x: &[f64], foot: usize, k: f64) -> FootMotion {
     let value = |derivative: usize| Vector3::from(layout.foot_node(foot, k, derivative).value::<3>(x));
     let (y, rate, second) = (value(0), value(1), value(2));
     let point = space.jet(&y, Order::Second);
     let (velocity, acceleration) = pushed(&point, &rate, &second);
     let variables = &layout.feet[foot];
-    let contact = !variables.swings.iter().any(|s| (s.swing.start as f64) < k && k < s.swing.end as f64);
+    let contact = !variables.swings.iter().any(|s| s.swing.start < k && k < s.swing.end);
     let at = |sample: usize| {
         layout.force(foot, sample).map_or_else(Vector3::zeros, |(_, node)| Vector3::from(node.value::<3>(x)))
     };

@@ -59,6 +59,54 @@ pub fn clamped_cubic(intervals: usize, u: f64) -> [Vec<f64>; 3] {
     [levels.pop().expect("four levels"), first, second]
 }
 
+/// The spline of a swing, collapsed onto (foothold, three control points, next foothold): each foothold is the outer two
+/// control points of its side. A polynomial a knot interval, so that it can be evaluated without allocation.
+#[derive(Clone, Debug)]
+pub struct SwingBasis {
+    /// `coefficients[interval][m][power]` of the local time, in units of u.
+    coefficients: [[[f64; 4]; 5]; SWING_INTERVALS],
+}
+
+impl SwingBasis {
+    /// From the values and derivatives at the knots.
+    pub fn new() -> Self {
+        let width = 1.0 / SWING_INTERVALS as f64;
+        let knots: Vec<[[f64; 5]; 3]> = (0..=SWING_INTERVALS)
+            .map(|i| clamped_cubic(SWING_INTERVALS, i as f64 * width))
+            .map(|levels| levels.map(|b| [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]]))
+            .collect();
+        Self {
+            coefficients: std::array::from_fn(|i| {
+                let (left, right) = (&knots[i], &knots[i + 1]);
+                std::array::from_fn(|m| {
+                    let third = (right[2][m] - left[2][m]) / width;
+                    [left[0][m], left[1][m], 0.5 * left[2][m], third / 6.0]
+                })
+            }),
+        }
+    }
+
+    /// The five weights and their first and second derivatives at u, which counts as 0 before the swing and as 1 after it.
+    pub fn at(&self, u: f64) -> [[f64; 5]; 3] {
+        let u = u.clamp(0.0, 1.0);
+        let i = ((u * SWING_INTERVALS as f64) as usize).min(SWING_INTERVALS - 1);
+        let s = u - i as f64 / SWING_INTERVALS as f64;
+        let mut weights = [[0.0; 5]; 3];
+        for (m, [c0, c1, c2, c3]) in self.coefficients[i].into_iter().enumerate() {
+            weights[0][m] = c0 + s * (c1 + s * (c2 + s * c3));
+            weights[1][m] = c1 + s * (2.0 * c2 + s * 3.0 * c3);
+            weights[2][m] = 2.0 * c2 + s * 6.0 * c3;
+        }
+        weights
+    }
+}
+
+impl Default for SwingBasis {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,6 +136,23 @@ mod tests {
                 assert!(((p[1][k] - m[1][k]) / (2.0 * e) - b[2][k]).abs() < 1e-6, "u {u} k {k}");
             }
         }
+    }
+
+    #[test]
+    fn the_collapsed_basis_is_the_clamped_one() {
+        let basis = SwingBasis::new();
+        for i in 0..=40 {
+            let u = f64::from(i) / 40.0;
+            let (short, long) = (basis.at(u), clamped_cubic(SWING_INTERVALS, u));
+            for derivative in 0..3 {
+                let b = &long[derivative];
+                let expected = [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]];
+                for m in 0..5 {
+                    assert!((short[derivative][m] - expected[m]).abs() < 1e-11, "u {u}, {derivative}, {m}");
+                }
+            }
+        }
+        assert_eq!(basis.at(-0.3)[0], [1.0, 0.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -6,6 +6,9 @@ use super::density::Density;
 use super::lbfgs::{Limits, Outcome};
 use super::problem::Problem;
 
+/// Where it settles it does so within a few dozen rounds; over folded places it wanders without end.
+const MAX_ROUNDS: usize = 150;
+
 /// Alternates from u. `progress` sees the iteration, the energy and the square of the last step in the energy's norm.
 ///
 /// The ground under the bottom is frozen in each round, and nothing of its slope reaches the points of the map: the energy
@@ -30,7 +33,7 @@ pub(super) fn alternate<D: Density>(
             outcome.converged = true;
             break;
         }
-        if outcome.iterations >= limits.iterations || !value.is_finite() {
+        if outcome.iterations >= limits.iterations.min(MAX_ROUNDS) || !value.is_finite() {
             break;
         }
         outcome.iterations += 1;

@@ -119,7 +119,7 @@ pub(super) fn frontier(groups: &[Group]) -> String {
         for name in varied {
             let of: Vec<&Group> =
                 here.iter().copied().filter(|group| group.parameter.is_some_and(|p| p.0 == name)).collect();
-            let column = if name == "knots" { 1.0 } else { 0.0 };
+            let column = if name == "base_knots" { 1.0 } else { 0.0 };
             curve(&mut svg, [90.0 + 600.0 * column, 110.0 + 350.0 * row as f64], terrain, name, &of);
         }
     }
@@ -130,7 +130,7 @@ fn curve(svg: &mut Svg, [x, y]: [f64; 2], terrain: &str, name: &str, groups: &[&
     let value = |group: &Group| group.parameter.map_or(0.0, |(_, value)| value);
     let frame = [x, y, 500.0, 250.0];
     let axes = Axes::new(frame, range(groups.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
-    let title = if name == "knots" { format!("{terrain}, medium") } else { terrain.to_string() };
+    let title = if name == "base_knots" { format!("{terrain}, medium") } else { terrain.to_string() };
     axes.draw(svg, &title, name, "motions found, %");
     for method in distinct(groups.iter().map(|group| group.method.as_str())) {
         let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {

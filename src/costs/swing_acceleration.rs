@@ -1,0 +1,127 @@
+//! How swinging feet accelerate: w ∫ ‖p̄̈_i‖² dt over the swings.
+//!
+//! ```text
+//!   w T⁻³ Σ_m share_m ‖S''(u_m)‖²,  T = b − a the duration of the swing
+//! ```
+//!
+//! By the trapezoidal rule on the swing's own knots u_m, between which S'' is linear. The path S(u) does not depend on time,
+//! so T stands in front of everything, given or not.
+
+use nalgebra::Vector3;
+
+use super::Cost;
+use crate::nlp::sink::Sink;
+use crate::nlp::state::Curvature;
+use crate::nlp::{Model, State};
+use crate::trajectory::LinearNode;
+use crate::trajectory::spline::SWING_INTERVALS;
+
+/// Feet that swing evenly.
+#[derive(Clone, Debug)]
+pub struct SwingAcceleration {
+    swings: Vec<Swing>,
+    time_step: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Swing {
+    foot: usize,
+    swing: usize,
+    /// Its lift-off, if it is a variable; touch-down is the next one.
+    switches: Option<usize>,
+    /// S'' at the knots, with their weights.
+    knots: Vec<(LinearNode, f64)>,
+}
+
+impl SwingAcceleration {
+    /// Of all feet.
+    pub fn new(model: &Model, weight: f64) -> Self {
+        let layout = &model.layout;
+        let mut swings = Vec::new();
+        for (foot, variables) in layout.feet.iter().enumerate() {
+            for (swing, s) in variables.swings.iter().enumerate() {
+                let knots = (0..=SWING_INTERVALS).map(|knot| {
+                    let share = if knot == 0 || knot == SWING_INTERVALS { 0.5 } else { 1.0 };
+                    let node = layout.swing_node(foot, swing, knot as f64 / SWING_INTERVALS as f64, 2);
+                    (node, 2.0 * weight * share / SWING_INTERVALS as f64)
+                });
+                swings.push(Swing { foot, swing, switches: s.switches, knots: knots.collect() });
+            }
+        }
+        Self { swings, time_step: layout.time_step }
+    }
+
+    /// T⁻³ and its first and second derivatives with respect to touch-down; those with respect to lift-off have a minus each.
+    fn factor(&self, state: &State, swing: &Swing) -> [f64; 3] {
+        let [a, b] = state.switches[swing.foot][swing.swing];
+        let duration = (b - a) * self.time_step;
+        let value = duration.powi(-3);
+        let rate = self.time_step / duration;
+        [value, -3.0 * value * rate, 12.0 * value * rate * rate]
+    }
+}
+
+/// Σ ½ w ‖S''‖²
+fn sum(swing: &Swing, x: &[f64]) -> f64 {
+    let square = |node: &LinearNode| Vector3::from(node.value::<3>(x)).norm_squared();
+    swing.knots.iter().map(|(node, weight)| 0.5 * weight * square(node)).sum()
+}
+
+impl Cost for SwingAcceleration {
+    fn name(&self) -> &'static str {
+        "swing acceleration"
+    }
+
+    fn value(&self, _model: &Model, state: &State, x: &[f64]) -> f64 {
+        self.swings.iter().map(|swing| self.factor(state, swing)[0] * sum(swing, x)).sum()
+    }
+
+    fn gradient(&self, _model: &Model, state: &State, x: &[f64], sink: &mut Sink) {
+        for swing in &self.swings {
+            let [value, slope, _] = self.factor(state, swing);
+            for (node, weight) in &swing.knots {
+                for (d, y) in node.value::<3>(x).into_iter().enumerate() {
+                    sink.node(0, node, d, value * weight * y);
+                }
+            }
+            if let Some(switches) = swing.switches {
+                let sum = sum(swing, x);
+                sink.add(0, switches, -slope * sum);
+                sink.add(0, switches + 1, slope * sum);
+            }
+        }
+    }
+
+    fn hessian(
+        &self,
+        _model: &Model,
+        state: &State,
+        x: &[f64],
+        factor: f64,
+        _curvature: &mut Curvature,
+        sink: &mut Sink,
+    ) {
+        for swing in &self.swings {
+            let [value, slope, bend] = self.factor(state, swing).map(|v| v * factor);
+            for (node, weight) in &swing.knots {
+                for d in 0..3 {
+                    sink.own(node, d, d, value * weight);
+                }
+            }
+            let Some(switches) = swing.switches else { continue };
+            for (node, weight) in &swing.knots {
+                for (d, y) in node.value::<3>(x).into_iter().enumerate() {
+                    node.differential(d).for_each(|(v, by)| {
+                        for (switch, sign) in [(switches, -1.0), (switches + 1, 1.0)] {
+                            sink.add(v.max(switch), v.min(switch), sign * slope * weight * y * by);
+                        }
+                    });
+                }
+            }
+            let sum = sum(swing, x);
+            sink.add(switches, switches, bend * sum);
+            sink.add(switches + 1, switches, -bend * sum);
+            sink.add(switches + 1, switches + 1, bend * sum);
+        }
+    }
+}
