@@ -37,7 +37,7 @@ def test_planned_joints_keep_their_limits_in_mujoco(known: bool, tmp_path: objec
     folder = str(tmp_path)
     with open(f"{folder}/robot.toml", "w") as file:
         file.write(robot)
-    scenario = SCENARIO.replace('name = "anymal_c"', 'name = "anymal_c"\nfile = "robot.toml"')
+    scenario = SCENARIO.replace('name = "anymal_c"', 'file = "robot.toml"')
     with open(f"{folder}/slope.toml", "w") as file:
         file.write(scenario)
     plan = warpgait.solve(f"{folder}/slope.toml")

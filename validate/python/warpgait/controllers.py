@@ -60,7 +60,7 @@ class Gains:
     weight_stance: float = 50.0
     weight_force: float = 3e-3
     weight_acceleration: float = 1e-3
-    least_normal_force: float = 5.0  # N, on feet that do not stick
+    least_normal_force: float = 5.0  # N, on feet that do not stick or do not touch yet
     joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
 
 
@@ -174,10 +174,12 @@ class WholeBody:
         for j, e in enumerate(stance):
             first = 6 + m + rows * j
             C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cones[k, e]
-            lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
-            if not touching[e]:  # to count on a force that is not there would throw the leg
+            lower[first + EDGES] = g.least_normal_force
+            if not touching[e]:  # to count on a force that is not there, push or pull, would throw the leg
                 upper[first + EDGES] = g.touch_force
-            lower[first + EDGES] = -self.pull[e] if self.pull[e] > 0 else g.least_normal_force
+            elif self.pull[e] > 0:
+                lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
+                lower[first + EDGES] = -self.pull[e]
         sense = np.zeros(len(C), np.int32)
         sense[:6] = 5  # equality
         x, _, flag, _ = daqp.solve(H, gradient, C, upper, lower, sense)

@@ -1,7 +1,7 @@
 """From what happened to numbers, from numbers to a verdict.
 
-Limits: fixed on hand-made plans with the whole-body controller. A metric passes up to `passes`, is marginal up to `marginal`, and fails
-beyond. Force metrics and the open loop are there because a whole-body controller tracks bad plans well: it repairs them silently.
+Limits: between what good plans of Table I and six spoilings of them come to (`warpgait.calibrate`; README). A metric passes up to
+`passes`, is marginal up to `marginal`, and fails beyond. Force metrics and the open loop are there because a whole-body controller tracks bad plans well: it repairs them silently.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
         Metric(
             layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 1, 5
         ),
-        Metric(layer, "full body: unexplained force, rms", _rms(result.body_residual[:, :3]) / mg, "m g", 0.12, 0.20),
+        Metric(layer, "full body: unexplained force, rms", _rms(result.body_residual[:, :3]) / mg, "m g", 0.05, 0.20),
         Metric(
             layer, "full body: unexplained torque, rms", _rms(result.body_residual[:, 3:]) / (mg * LEVER), "m g·0.3 m", 0.10, 0.20
         ),
@@ -166,11 +166,11 @@ def closed_loop(
         Metric(layer, "fall", fell, "", 0, 0),
         Metric(layer, "contacts other than feet", float((replay.stray_contacts > 0).sum()), "samples", 0, 0),
         Metric(layer, "controller without solution", 100.0 * replay.controller_failures / K, "% of steps", 0, 1),
-        Metric(layer, "centre of mass, rms", 1e3 * float(np.sqrt((com**2).mean())), "mm", 15, 40),
-        Metric(layer, "centre of mass, max", 1e3 * float(com.max()), "mm", 40, 100),
+        Metric(layer, "centre of mass, rms", 1e3 * float(np.sqrt((com**2).mean())), "mm", 7, 40),
+        Metric(layer, "centre of mass, max", 1e3 * float(com.max()), "mm", 20, 100),
         Metric(layer, "rotation, rms", float(np.sqrt((turn**2).mean())), "°", 1, 3),
         Metric(layer, "rotation, max", float(turn.max()), "°", 3, 8),
-        Metric(layer, "feet, rms", 1e3 * _rms(replay.foot - reference.foot[:K]), "mm", 10, 25),
+        Metric(layer, "feet, rms", 1e3 * _rms(replay.foot - reference.foot[:K]), "mm", 5, 25),
         Metric(layer, "slip per step", 1e3 * float(replay.slip.sum()) / max(stances, 1), "mm", 3, 10),
         Metric(layer, "contact mismatch", 100 * float((contact != planned).mean()), "% of samples", 1.5, 4),
         Metric(layer, "torque at its limit", 100 * float(saturated.mean()), "% of samples", 0.5, 6),
