@@ -163,3 +163,25 @@ fn what_cannot_be_done_is_reported_with_its_place() {
     assert!(worst.largest > 1e-3 && !worst.block.is_empty());
     assert!(!report.passed, "the check agrees");
 }
+
+/// With `contact.friction_margin` forces keep off the cone by that share.
+#[test]
+fn a_margin_of_friction_is_left() {
+    let text = "formulation = \"direct\"\nhorizon = 3.0\n[robot]\nname = \"anymal_towr\"\n\
+                [gait]\nkind = \"trot\"\ncycle = 0.8\n[terrain]\nkind = \"rippled\"\n[start]\nposition = [0.0, 0.0]\n\
+                [goal]\nposition = [0.4, 0.1]\n[contact]\nfriction_margin = 0.6\n";
+    let slip = |margin: &str| {
+        let (motion, plan, report) = run(&text.replace("friction_margin = 0.6", margin));
+        assert!(motion.solved, "{}", motion.status);
+        assert_eq!(failures(&report), Vec::<String>::new());
+        let weight = plan.meta.robot.mass * 9.81;
+        let over = |(force, normal): (&[f64; 3], &[f64; 3])| {
+            let u: f64 = (0..3).map(|c| force[c] * normal[c]).sum();
+            let t = (0..3).map(|c| (force[c] - u * normal[c]).powi(2)).sum::<f64>().sqrt();
+            (t - 0.4 * 0.75 * u) / weight
+        };
+        plan.foot_force.iter().zip(&plan.foot_normal).map(over).fold(0.0, f64::max)
+    };
+    assert!(slip("friction_margin = 0.6") < 5e-3);
+    assert!(slip("friction_margin = 0.0") > 5e-3, "the margin would not matter here");
+}

@@ -74,6 +74,7 @@ impl Problem {
     /// Composes the problem of a scenario, to be started from `initial`.
     pub fn new(scenario: &Scenario, model: Model, initial: Vec<f64>, choice: Choice) -> Self {
         let (motion, contact) = (&scenario.motion, &scenario.contact);
+        let friction = (1.0 - contact.friction_margin) * contact.friction;
         let intervals = model.layout.intervals;
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
@@ -83,8 +84,8 @@ impl Problem {
             },
             Box::new(Reach::new(&model)),
             match contact.cone {
-                Cone::Exact => Box::new(Friction::new(&model, contact.friction)),
-                Cone::Conformal => Box::new(FrictionConformal::new(&model, contact.friction)),
+                Cone::Exact => Box::new(Friction::new(&model, friction)),
+                Cone::Conformal => Box::new(FrictionConformal::new(&model, friction)),
             },
             Box::new(NormalForce::new(&model, motion.force_limit, motion.pull_limit)),
             Box::new(OnGround::new(&model)),

@@ -323,6 +323,9 @@ pub struct ContactSpec {
     /// ν.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub friction: f64,
+    /// Share of ν that the plan leaves to the controller: forces stay within (1 − margin) ν.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub friction_margin: f64,
     /// Which cone.
     pub cone: Cone,
     /// Greatest slope |∇h| of a foothold; default: none.
@@ -335,7 +338,7 @@ pub struct ContactSpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { friction: 0.75, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
+        Self { friction: 0.75, friction_margin: 0.0, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
     }
 }
 
