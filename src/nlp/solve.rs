@@ -212,10 +212,13 @@ impl<'a, 'b> Run<'a, 'b> {
             row.iteration += before;
             row.seconds += seconds_before;
             let iteration = row.iteration;
-            history.push(row);
-            if on_progress(&Progress { stage: name, iteration, record }).is_break() {
-                stopped = true;
-                return ControlFlow::Break(());
+            // A later stage starts at the point where the one before it ended, which has its row.
+            if record.iteration > 0 || history.is_empty() {
+                history.push(row);
+                if on_progress(&Progress { stage: name, iteration, record }).is_break() {
+                    stopped = true;
+                    return ControlFlow::Break(());
+                }
             }
             if record.violation > tolerance {
                 return ControlFlow::Continue(());
