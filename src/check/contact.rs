@@ -112,8 +112,7 @@ fn footholds(s: &Subject, findings: &mut Vec<Finding>) {
             let beyond = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
             outside.meet(1e3 * beyond(x, x_min, x_max).hypot(beyond(y, y_min, y_max)), n, Some(e));
         }
-        // Feet that adhere may stand on walls.
-        if let Some(most) = s.scenario.contact.max_slope.filter(|_| !s.plan.foot_adhesive[e]) {
+        if let Some(most) = s.scenario.contact.max_slope {
             let margin = s.scenario.contact.edge_margin;
             for [u, v] in [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
                 let normal = s.ground.normal(x + margin * u, y + margin * v);

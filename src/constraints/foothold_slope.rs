@@ -28,15 +28,13 @@ pub struct FootholdSlope {
 const AROUND: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
 impl FootholdSlope {
-    /// For every stance of a foot that does not adhere; `margin` in m.
+    /// For every stance; `margin` in m.
     pub fn new(model: &Model, max_slope: f64, margin: f64) -> Self {
         let (stances, middles) = all_stances(model);
         let (mut places, mut samples) = (Vec::new(), Vec::new());
         for ((i, j), sample) in stances.into_iter().zip(middles) {
-            if !model.adhesive[i] {
-                places.extend(AROUND.map(|[x, y]| (i, j, [margin * x, margin * y])));
-                samples.extend([sample; AROUND.len()]);
-            }
+            places.extend(AROUND.map(|[x, y]| (i, j, [margin * x, margin * y])));
+            samples.extend([sample; AROUND.len()]);
         }
         Self { max_slope, places, samples }
     }

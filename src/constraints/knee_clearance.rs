@@ -11,8 +11,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Normal, Place, height_form, reach};
-use crate::heightfield::HeightJet;
+use super::{Constraint, Place, distance, reach};
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
 use crate::nlp::sink::Sink;
@@ -48,17 +47,6 @@ impl KneeClearance {
 fn points<T: Scalar>(leg: &Leg, r: [T; 3]) -> [[T; 3]; 2] {
     let posture = leg.posture(r);
     [posture.knee(), posture.on_shank(leg.corner)]
-}
-
-/// The distance of q to the tangent plane of the ground below it, its gradient and Hessian.
-fn distance(q: &Vector3<f64>, ground: &HeightJet) -> (f64, Vector3<f64>, Matrix3<f64>) {
-    let normal = Normal::new(ground);
-    let (gap, nz) = (q.z - ground.h, normal.n.z);
-    let by_gap = Vector3::new(-ground.d1[0], -ground.d1[1], 1.0);
-    let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
-    let form = by_gap * by_nz.transpose() + by_nz * by_gap.transpose() - height_form(ground) * nz
-        + normal.curvature(&Vector3::z()) * gap;
-    (gap * nz, by_gap * nz + by_nz * gap, form)
 }
 
 /// A point and how it moves: dq = by_turn δ + by_base dp + by_foot dp_i.

@@ -66,6 +66,17 @@ pub(crate) fn height_form(ground: &HeightJet) -> Matrix3<f64> {
     Matrix3::new(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, 0.0)
 }
 
+/// (zᵀq − h(q)) n_z, the distance of q to the tangent plane of the ground below it, with its gradient and Hessian in q.
+pub(crate) fn distance(q: &Vector3<f64>, ground: &HeightJet) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let normal = Normal::new(ground);
+    let (gap, nz) = (q.z - ground.h, normal.n.z);
+    let by_gap = Vector3::new(-ground.d1[0], -ground.d1[1], 1.0);
+    let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
+    let form = by_gap * by_nz.transpose() + by_nz * by_gap.transpose() - height_form(ground) * nz
+        + normal.curvature(&Vector3::z()) * gap;
+    (gap * nz, by_gap * nz + by_nz * gap, form)
+}
+
 /// Unit normal of the ground with its first (x, y) and second (xx, xy, yy) derivatives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Normal {

@@ -12,9 +12,9 @@
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
 //! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Normal, Place};
+use super::{Constraint, Place, distance};
 use crate::nlp::sink::Sink;
 use crate::nlp::state::{Curvature, FootNode, Tangent, swing_points};
 use crate::nlp::{Model, State};
@@ -66,15 +66,11 @@ impl SwingClearance {
             At::Point { foot, n, .. } => (&state.points[foot][n], &state.swing_points[foot][n].node),
         }
     }
-}
 
-/// (gap · n_z) and its derivative in the ambient position.
-fn distance(node: &FootNode) -> (f64, Vector3<f64>, Normal) {
-    let (gap, by_gap) = node.gap();
-    let normal = Normal::new(&node.ground);
-    let nz = normal.n.z;
-    let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
-    (gap * nz, by_gap * nz + by_nz * gap, normal)
+    fn distance(&self, state: &State, at: At) -> (f64, Vector3<f64>, Matrix3<f64>) {
+        let foot = self.node(state, at).0;
+        distance(&foot.point.position, &foot.ground)
+    }
 }
 
 impl Constraint for SwingClearance {
@@ -98,14 +94,14 @@ impl Constraint for SwingClearance {
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
         for (value, &at) in out.iter_mut().zip(&self.places) {
-            *value = distance(self.node(state, at).0).0;
+            *value = self.distance(state, at).0;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::position(model, &foot.point, node).row(first + r, &distance(foot).1, sink);
+            Tangent::position(model, &foot.point, node).row(first + r, &self.distance(state, at).1, sink);
         }
     }
 
@@ -119,17 +115,11 @@ impl Constraint for SwingClearance {
     ) {
         for (&lambda, &at) in multipliers.iter().zip(&self.places) {
             let (foot, node) = self.node(state, at);
-            let (_, by_position, normal) = distance(foot);
+            let (_, by_position, form) = self.distance(state, at);
             match at {
                 At::Sample { foot, k, .. } => curvature.swings[foot][k] += by_position * lambda,
                 At::Point { foot, n, .. } => curvature.points[foot][n] += by_position * lambda,
             }
-            let (gap, by_gap) = foot.gap();
-            let by_nz = Vector3::new(normal.first[0].z, normal.first[1].z, 0.0);
-            let form = super::height_form(&foot.ground) * -normal.n.z
-                + by_gap * by_nz.transpose()
-                + by_nz * by_gap.transpose()
-                + normal.curvature(&Vector3::z()) * gap;
             Tangent::position(model, &foot.point, node).quadratic(&(form * lambda), sink);
         }
     }

@@ -6,22 +6,17 @@ use super::Cost;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
-use crate::trajectory::LinearNode;
 
 /// A base that moves evenly.
 #[derive(Clone, Debug)]
 pub struct BaseAcceleration {
-    /// Accelerations at the samples.
-    nodes: Vec<LinearNode>,
     weight: f64,
 }
 
 impl BaseAcceleration {
     /// Over the whole motion.
     pub fn new(model: &Model, weight: f64) -> Self {
-        let layout = &model.layout;
-        let nodes = (0..=layout.intervals).map(|k| layout.base_node(k as f64, 2)).collect();
-        Self { nodes, weight: 2.0 * weight * layout.time_step }
+        Self { weight: 2.0 * weight * model.layout.time_step }
     }
 }
 
@@ -30,14 +25,14 @@ impl Cost for BaseAcceleration {
         "base acceleration"
     }
 
-    fn value(&self, _model: &Model, _state: &State, x: &[f64]) -> f64 {
-        let square = |node: &LinearNode| node.value::<6>(x).iter().map(|v| v * v).sum::<f64>();
-        0.5 * self.weight * self.nodes.iter().map(square).sum::<f64>()
+    fn value(&self, _model: &Model, state: &State, _x: &[f64]) -> f64 {
+        let squares = state.base_motion.iter().flat_map(|[_, _, acceleration]| acceleration.map(|v| v * v));
+        0.5 * self.weight * squares.sum::<f64>()
     }
 
-    fn gradient(&self, _model: &Model, _state: &State, x: &[f64], sink: &mut Sink) {
-        for node in &self.nodes {
-            for (d, value) in node.value::<6>(x).into_iter().enumerate() {
+    fn gradient(&self, model: &Model, state: &State, _x: &[f64], sink: &mut Sink) {
+        for ([_, node], [_, _, acceleration]) in model.layout.base_rates.iter().zip(&state.base_motion) {
+            for (d, value) in acceleration.iter().enumerate() {
                 sink.node(0, node, d, self.weight * value);
             }
         }
@@ -45,14 +40,14 @@ impl Cost for BaseAcceleration {
 
     fn hessian(
         &self,
-        _model: &Model,
+        model: &Model,
         _state: &State,
         _x: &[f64],
         factor: f64,
         _curvature: &mut Curvature,
         sink: &mut Sink,
     ) {
-        for node in &self.nodes {
+        for [_, node] in &model.layout.base_rates {
             for d in 0..6 {
                 sink.own(node, d, d, factor * self.weight);
             }

@@ -7,9 +7,8 @@ use nalgebra::Matrix3;
 use super::Cost;
 use crate::constraints::reach;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
-use crate::trajectory::rotation::cross_matrix;
 
 /// Footholds near the nominal ones.
 #[derive(Clone, Debug)]
@@ -72,20 +71,7 @@ impl Cost for Posture {
         for &(i, k) in &self.places {
             let error = reach::value(model, state, (i, k)) - model.nominal[i];
             reach::say_curvature(model, state, (i, k), &(error * weight), curvature, sink);
-            // Jᵀ J of r = Rᵀ(p_i − p): dr = Rᵀ([r] δ + dp_i − dp).
-            let (base, foot) = (&state.base[k], state.foot(model, i, k));
-            let arm = cross_matrix(&(foot.point.position - base.position()));
-            let one = Matrix3::identity() * weight;
-            let node = &model.layout.base[k];
-            let turn = Tangent::turn(model, base, node);
-            let body = Tangent::position(model, &base.point, node);
-            let foot = Tangent::position(model, &foot.point, state.foot_node(i, k));
-            turn.quadratic(&(arm.transpose() * arm * weight), sink);
-            body.quadratic(&one, sink);
-            foot.quadratic(&one, sink);
-            turn.cross(&(arm.transpose() * weight), &foot, sink);
-            turn.cross(&(arm.transpose() * -weight), &body, sink);
-            body.cross(&-one, &foot, sink);
+            reach::say_quadratic(model, state, (i, k), &(Matrix3::identity() * weight), sink);
         }
     }
 }
