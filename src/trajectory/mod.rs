@@ -5,6 +5,7 @@
 
 pub mod gait;
 pub mod layout;
+pub mod node;
 pub mod rotation;
 pub mod sampling;
 pub mod space;
@@ -12,4 +13,5 @@ pub mod spline;
 pub mod switches;
 
 pub use gait::{Gait, Stance, Swing};
-pub use layout::{Layout, LinearNode};
+pub use layout::Layout;
+pub use node::LinearNode;
