@@ -14,7 +14,7 @@
 //! - A panic in the problem stops the solve and goes on in the caller once Ipopt has cleaned up.
 //! - Ctrl-C, once [`install_ctrl_c`] was called, stops the solve at the next iteration; see [`INTERRUPT`].
 //!
-//! This module is the only place in the crate with `unsafe` code: in `application`, `callbacks` and one call in `solve`.
+//! This module is the only place in the crate with `unsafe` code: in `application`, `callbacks`, `memory` and one call in `solve`.
 
 use std::ops::ControlFlow;
 
@@ -24,12 +24,14 @@ mod error;
 mod interrupt;
 mod layout;
 mod lock;
+mod memory;
 mod options;
 mod solution;
 mod solve;
 
 pub use error::IpoptError;
 pub use interrupt::{INTERRUPT, InterruptFlag, install_ctrl_c};
+pub use memory::keep_freed_memory;
 pub use options::{OptionValue, Options};
 pub use solution::{IterationRecord, Mode, Multipliers, Solution, Status};
 pub use solve::solve;

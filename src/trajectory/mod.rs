@@ -4,6 +4,7 @@
 //! [`crate::nlp::state`].
 
 pub mod gait;
+pub mod instant;
 pub mod layout;
 pub mod node;
 pub mod rotation;
@@ -13,5 +14,6 @@ pub mod spline;
 pub mod switches;
 
 pub use gait::{Gait, Stance, Swing};
+pub use instant::Instant;
 pub use layout::Layout;
 pub use node::LinearNode;

@@ -15,6 +15,8 @@
 //! there as it does with given durations. ḡ obeys the cone and the limits of the normal force, whatever σ is, and then so
 //! does f̄.
 
+use std::ops::Range;
+
 use super::gait::Swing;
 use super::node::LinearNode;
 use super::spline::SwingBasis;
@@ -127,7 +129,7 @@ pub fn share(k: usize, touch_down: Option<f64>, lift_off: Option<f64>) -> f64 {
 enum Timing {
     /// Not at all.
     Given,
-    /// A foot in or near a swing, at this sample.
+    /// A foot in or near a swing, at this time in samples.
     Moving(f64),
     /// A force after touch-down: the ramp's argument is this minus the switch.
     Rising(f64),
@@ -153,9 +155,9 @@ impl TimedNode {
         Self { node, mixed: Vec::new(), second: [[0.0; 3]; 3], timing: Timing::Given }
     }
 
-    /// A foot at sample k of a swing from foothold to foothold by way of control points, with switches at `lift_off` and
+    /// A foot at time k, in samples, of a swing from foothold to foothold by way of control points, with switches at `lift_off` and
     /// the variable after it.
-    pub fn moving(k: usize, variables: [usize; 5], lift_off: usize) -> Self {
+    pub fn moving(k: f64, variables: [usize; 5], lift_off: usize) -> Self {
         Self {
             node: LinearNode {
                 terms: variables.map(|v| (v, 0.0)).to_vec(),
@@ -163,7 +165,7 @@ impl TimedNode {
             },
             mixed: vec![[0.0; 2]; variables.len()],
             second: [[0.0; 3]; 3],
-            timing: Timing::Moving(k as f64),
+            timing: Timing::Moving(k),
         }
     }
 
@@ -247,6 +249,22 @@ impl TimedNode {
             self.second[0][d] = bend * x[full + d];
         }
     }
+}
+
+/// The samples of a stance between two swings at which the foot may bear something: a force acts from the sample before to the
+/// sample after, all of which must lie within the stance.
+pub(super) fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize) -> Range<usize> {
+    let first = before.map_or(0.0, |s| {
+        // At the very end of its room a switch leaves no force there.
+        let earliest = s.end - s.room[1] + 1.0;
+        if s.is_free() { earliest.floor() + 1.0 } else { earliest.ceil() }
+    });
+    let last = after.map_or(intervals as f64, |s| {
+        let latest = s.start + s.room[0] - 1.0;
+        if s.is_free() { latest.ceil() - 1.0 } else { latest.floor() }
+    });
+    let first = first as usize;
+    first..((last + 1.0).max(0.0) as usize).max(first)
 }
 
 #[cfg(test)]
