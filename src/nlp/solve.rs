@@ -26,8 +26,9 @@ const CONTINUATION_STEPS: u32 = 3;
 /// Share of the iterations that the plain solve may take when a continuation may follow.
 const PLAIN_SHARE: f64 = 0.5;
 
-/// Ipopt's `sigma_min`. Out of the medium pit, the paper's 15 ways, warped and direct: 37 and 24 iterations in the median with Ipopt's own
-/// 10⁻⁶; with 0.1 some take as many, with 0.5 other terrains take more.
+/// Ipopt's `sigma_min` for solves with the exact Hessian from the guess. With Ipopt's own 10⁻⁶, ways out of the medium pit take 20 to 60
+/// iterations, with 0.1 up to 35, with 0.3 20 to 28; with 0.5 other terrains take more. From a feasible point, or
+/// with limited memory, it costs iterations.
 const LEAST_CENTERING: f64 = 0.3;
 
 /// What is going on, for people who wait.
@@ -132,6 +133,15 @@ pub fn solve(
     run.finish(stage)
 }
 
+/// Where a solve starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// At the guess.
+    Guess,
+    /// At a point that obeys all constraints, or did before some were added or the terrain grew.
+    Feasible,
+}
+
 /// One solve's end.
 struct Stage {
     problem: Problem,
@@ -175,17 +185,18 @@ impl<'a, 'b> Run<'a, 'b> {
     /// Where legs are known, first to a feasible point without their joints, whose speeds and torques at the guess may be anything:
     /// out of the pit this takes a third of the iterations that all at once take, and ends where that does not (docs/results.md).
     fn plain(&mut self, model: Model, budget: usize) -> Result<Stage> {
-        let mut x = self.guess(&model)?;
+        let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
         if model.legs.iter().any(Option::is_some) {
             let mut rough = model.clone();
             rough.legs.fill(None);
-            let rough = self.stage("without joints", rough, x, Effort::Feasible, budget)?;
+            let rough = self.stage("without joints", rough, x, start, Effort::Feasible, budget)?;
             if !rough.feasible || rough.interrupted {
                 return Ok(rough);
             }
-            x = rough.x;
+            (x, start) = (rough.x, Start::Feasible);
         }
-        self.stage("solve", model, x, self.scenario.solver.effort, budget.saturating_sub(self.iterations))
+        let left = budget.saturating_sub(self.iterations);
+        self.stage("solve", model, x, start, self.scenario.solver.effort, left)
     }
 
     /// Solves from x with at most `budget` iterations.
@@ -194,6 +205,7 @@ impl<'a, 'b> Run<'a, 'b> {
         name: &str,
         model: Model,
         x: Vec<f64>,
+        start: Start,
         effort: Effort,
         budget: usize,
     ) -> Result<Stage> {
@@ -204,7 +216,7 @@ impl<'a, 'b> Run<'a, 'b> {
             solver.hessian.unwrap_or(if with_costs { Hessian::Exact } else { Hessian::LimitedMemory });
         let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
         let mut problem = Problem::new(self.scenario, model, x, choice);
-        let options = options(hessian, solver.hessian_memory, tolerance, budget);
+        let options = options(hessian, start, solver.hessian_memory, tolerance, budget);
 
         let (history, on_progress) = (&mut self.history, &mut *self.on_progress);
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
@@ -294,14 +306,15 @@ impl<'a, 'b> Run<'a, 'b> {
                 _ => Space::Direct,
             };
             let model = Model::new(self.scenario, robot, scaled, space)?;
-            let mut x = self.guess(&model)?;
+            let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
             if let Some(from) = &from {
                 // The pinned start is where this terrain has it; all else goes on from the last step.
                 x[6..].copy_from_slice(&from[6..]);
+                start = Start::Feasible;
             }
             let name = format!("continuation, terrain at {:.0} %", 100.0 * share);
             let effort = if whole { self.scenario.solver.effort } else { Effort::Feasible };
-            last = self.stage(&name, model, x, effort, left)?;
+            last = self.stage(&name, model, x, start, effort, left)?;
             if !last.feasible && !whole {
                 last.status =
                     format!("{} with the terrain at {:.0} % of its height", last.status, 100.0 * share);
@@ -344,11 +357,15 @@ fn map_of(ground: &Heightfield, scenario: &Scenario) -> Result<WarpMap> {
 
 /// Adaptive μ (monotone takes ten times the iterations), and MUMPS with the AMD ordering (1.6 times faster than its default).
 ///
-/// μ must not run ahead of the rest: where the Hessian is indefinite (the pit's edge) Ipopt's oracle drives it to 10⁻⁶ and below while the
-/// dual infeasibility is near 1; the iterates then hug the bounds and steps are cut to a fifth, for dozens of iterations. So a step
-/// lowers it to [`LEAST_CENTERING`] of the average complementarity at least, and never below what the tolerance needs.
-fn options(hessian: Hessian, memory: usize, tolerance: f64, max_iterations: usize) -> Options {
-    Options::new()
+/// From the guess μ must not run ahead of the rest: where the Hessian is indefinite (the pit's edge) Ipopt's oracle drives it to 10⁻⁶ and
+/// below while the dual infeasibility is near 1; the iterates then hug the bounds and steps are cut to a fifth, for dozens of
+/// iterations. So an iteration lowers it to [`LEAST_CENTERING`] of the average complementarity at most.
+fn options(hessian: Hessian, start: Start, memory: usize, tolerance: f64, max_iterations: usize) -> Options {
+    let options = match (hessian, start) {
+        (Hessian::Exact, Start::Guess) => Options::new().set_num("sigma_min", LEAST_CENTERING),
+        _ => Options::new(),
+    };
+    options
         .set_int("max_iter", max_iterations as i32)
         .set_str(
             "hessian_approximation",
@@ -359,8 +376,6 @@ fn options(hessian: Hessian, memory: usize, tolerance: f64, max_iterations: usiz
         )
         .set_int("limited_memory_max_history", memory as i32)
         .set_str("mu_strategy", "adaptive")
-        .set_num("sigma_min", LEAST_CENTERING)
-        .set_num("mu_min", 0.1 * tolerance)
         .set_int("mumps_pivot_order", 0)
         .set_num("tol", tolerance)
         .set_num("constr_viol_tol", tolerance)
