@@ -125,3 +125,18 @@ def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
     assert [t.name for t in found.trials] == ["closed loop", "closed loop, raw terrain"]
     assert found.trials[0].verdict is Verdict.PASS
     assert found.verdict is not Verdict.PASS
+
+
+def test_a_foot_steps_over_an_edge_that_the_plan_does_not_know(tmp_path: Path) -> None:
+    """7 cm high, 5 cm before the foot; a foot that only follows its path stays 15 cm behind."""
+    plan = load(crawl.make(tmp_path / "edge.plan.npz", steps=2, stride=0.16, spacing=0.01))
+    ground, e = plan.terrain, plan.foot_names.index("RF")
+    rows, columns = ground.heights.shape
+    x = ground.origin[0] + ground.spacing[0] * np.arange(columns) - plan.foot_position[0, e, 0]
+    y = ground.origin[1] + ground.spacing[1] * np.arange(rows) - plan.foot_position[0, e, 1]
+    edge = (abs(x - 0.06) < 0.01) & (abs(y[:, None]) < 0.06)
+    with_edge = Heightfield(ground.heights + 0.07 * edge, ground.origin, ground.spacing)
+    trial = validate(replace(plan, terrain_raw=with_edge), Settings(second_opinion=False)).trials[1]
+    assert not trial.incidents
+    behind = trial.replay.foot[-1, e] - trial.reference.foot[-1, e]
+    assert np.linalg.norm(behind) < 0.02
