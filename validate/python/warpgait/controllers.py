@@ -89,7 +89,8 @@ class StepOver:
         self._met = ~stance & (self._met | (touching & (s > 0.05) & (s < 0.5)))
         rising = self._met & (self._risen < self._limit)
         self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
-        return (1 - s**3 * (10 - 15 * s + 6 * s * s)) * self._risen, rising * self._speed
+        fade: Array = 1 - s**3 * (10 - 15 * s + 6 * s * s)
+        return fade * self._risen, rising * self._speed
 
 
 class Controller(Protocol):
