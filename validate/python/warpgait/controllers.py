@@ -79,7 +79,7 @@ class StepOver:
             edges = np.flatnonzero(np.diff(np.concatenate([[True], reference.contact[:, e], [True]])))
             for a, b in edges.reshape(-1, 2):
                 self._progress[a:b, e] = np.arange(b - a) / (b - a)
-        self._step, self._speed, self._limit = speed * reference.t[1], speed, limit
+        self._step, self._speed, self._limit = speed * float(reference.t[1]), speed, limit
         self._met = np.zeros(reference.contact.shape[1], bool)
         self._risen = np.zeros(reference.contact.shape[1])
 
@@ -89,8 +89,9 @@ class StepOver:
         self._met = ~stance & (self._met | (touching & (s > 0.05) & (s < 0.5)))
         rising = self._met & (self._risen < self._limit)
         self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
-        fade: Array = 1 - s**3 * (10 - 15 * s + 6 * s * s)
-        return fade * self._risen, rising * self._speed
+        rise: Array = (1 - s**3 * (10 - 15 * s + 6 * s * s)) * self._risen
+        speed: Array = rising * self._speed
+        return rise, speed
 
 
 class Controller(Protocol):
