@@ -89,9 +89,7 @@ class StepOver:
         self._met = ~stance & (self._met | (touching & (s > 0.05) & (s < 0.5)))
         rising = self._met & (self._risen < self._limit)
         self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
-        rise: Array = (1 - s**3 * (10 - 15 * s + 6 * s * s)) * self._risen
-        speed: Array = rising * self._speed
-        return rise, speed
+        return (1 - s**3 * (10 - 15 * s + 6 * s * s)) * self._risen, np.where(rising, self._speed, 0.0)
 
 
 class Controller(Protocol):
