@@ -68,7 +68,7 @@ class _Feet:
 
     def look(self, data: Any) -> Bools:
         """Which feet touch the ground (E,); remembers this step's contacts for `forces`."""
-        geom = data.contact.geom
+        geom = data.contact.geom.reshape(-1, 2)
         self.first = geom[:, 0] == self.ground
         self.other = np.where(self.first, geom[:, 1], geom[:, 0])
         self.foot = self.foot_of_geom[self.other]
