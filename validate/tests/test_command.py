@@ -57,9 +57,36 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     assert "no full model" in capsys.readouterr().err
     assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
-    assert main([str(standing_plan), "--friction", "-1"]) == 2
-    assert main([str(standing_plan), "--rate", "333"]) == 2
-    assert main([str(standing_plan), "--push", "0,nan,0,0,0"]) == 2
+    before = sorted(standing_plan.parent.iterdir())
+    for wrong in (
+        ["--friction", "-1"],
+        ["--rate", "333"],
+        ["--rate", "0"],
+        ["--push", "0,nan,0,0,0"],
+        ["--push", "0,-1,0,0,0"],
+        ["--seed", "-1"],
+    ):
+        assert main([str(standing_plan), *wrong]) == 2
+        assert wrong[0] in capsys.readouterr().err
+    assert sorted(standing_plan.parent.iterdir()) == before  # a report of an earlier run stays
+
+
+def test_an_error_of_the_program_is_no_verdict(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("warpgait.validation.analyse", lambda *_: 1 / 0)
+    assert main([str(standing_plan), "-o", str(tmp_path)]) == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_output_that_nobody_reads_leaves_the_verdict_alone(standing_plan: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-pictures"]
+    run = subprocess.Popen([*command, "--no-second-opinion"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert run.stdout is not None and run.stderr is not None
+    run.stdout.close()
+    assert run.wait() == 0, run.stderr.read()
+    run.stderr.close()
+    assert json.loads((tmp_path / "stand.report.json").read_text())["verdict"] == "pass"
 
 
 def test_without_a_display_or_opengl_the_report_says_what_to_install(

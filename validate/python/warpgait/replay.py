@@ -80,6 +80,8 @@ class _Feet:
         """Forces (E, 3) of the contacts seen by `look`, now that they are known, and the other geoms that touch the ground."""
         E, contact = len(self.index.feet), data.contact
         row = contact.efc_address
+        if len(row) != len(self.foot):  # the simulation blew up, and MuJoCo began anew
+            return np.zeros((E, 3)), []
         active = np.flatnonzero((self.foot >= 0) & (row >= 0))
         if not len(active):
             return np.zeros((E, 3)), [int(g) for g in self.other[self.foot < 0]]

@@ -9,7 +9,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,6 +92,12 @@ def _refuse_nonsense(options: argparse.Namespace) -> None:
         raise InputError(f"--noise {options.noise:g}: must be in [0, 100]")
     if not 0 <= options.delay <= 0.2:
         raise InputError(f"--delay {options.delay:g}: must be in [0, 0.2] s")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: must not be negative")
+    if options.push is not None and not options.push[1] > 0:
+        raise InputError(f"--push: the duration, {options.push[1]:g} s, must be positive")
+    if not 50 <= options.rate <= 500 or 500 % options.rate:
+        raise InputError(f"--rate {options.rate:g}: must be 500 Hz divided by a whole number, and at least 50")
 
 
 def _run(options: argparse.Namespace, folder: Path) -> int:
@@ -102,7 +110,6 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
         if not (options.quiet or options.json):
             print(f"validate: {text}", file=sys.stderr)
 
-    _refuse_nonsense(options)
     loaded = plan.load(options.plan)
     disturbance = scene.Disturbance(
         friction=options.friction,
@@ -118,12 +125,16 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
 
     if not options.no_files:
         _write(options, folder, found, say)
-    if options.json:
-        print(json.dumps(report.as_dict(found), allow_nan=False))
-    else:
-        _summary(found)
-        if not options.no_files:
-            print(f"{folder / _stem(options.plan)}.report.html")
+    try:
+        if options.json:
+            print(json.dumps(report.as_dict(found), allow_nan=False))
+        else:
+            _summary(found)
+            if not options.no_files:
+                print(f"{folder / _stem(options.plan)}.report.html")
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read our output has enough of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0 if report.trackable(found) else 1
 
 
@@ -173,6 +184,11 @@ def main(words: list[str] | None = None) -> int:
     options = arguments().parse_args(words)
     folder = options.output or options.plan.parent
     try:
+        _refuse_nonsense(options)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    try:
         return _run(options, folder)
     except (InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -182,6 +198,10 @@ def main(words: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("validate: interrupted", file=sys.stderr)
         return 130
+    except Exception:  # exit code 1 means "not trackable", which an error in this program must not say
+        traceback.print_exc()
+        print("error: the replay itself failed, see above; please report it with the plan", file=sys.stderr)
+        return 2
 
 
 def _report_error(target: Path, plan: str, message: str) -> None:
