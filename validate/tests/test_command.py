@@ -1,6 +1,7 @@
 """The command: files, exit codes, messages."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -96,6 +97,15 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
     assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]) == 0
     assert "libegl1" in capsys.readouterr().err
     assert "libegl1" in (tmp_path / "stand.report.html").read_text()
+
+
+def test_an_opengl_that_is_missing_costs_the_pictures_only(standing_plan: Path, tmp_path: Path) -> None:
+    """MuJoCo itself cannot be imported with such a setting."""
+    command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]
+    environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "No pictures" in done.stderr and "libosmesa6" in done.stderr
 
 
 def test_without_ffmpeg_a_film_is_refused_kindly(

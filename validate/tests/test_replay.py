@@ -125,6 +125,7 @@ def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
     assert [t.name for t in found.trials] == ["closed loop", "closed loop, raw terrain"]
     assert found.trials[0].verdict is Verdict.PASS
     assert found.verdict is not Verdict.PASS
+    assert found.shown is found.trials[1]  # pictures and plots are of what went wrong
 
 
 def test_a_foot_steps_over_an_edge_that_the_plan_does_not_know(tmp_path: Path) -> None:

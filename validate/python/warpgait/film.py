@@ -47,7 +47,7 @@ def ffmpeg() -> str | None:
 
 def _drawn_terrain(v: Validation) -> Heightfield:
     """The terrain around the way, coarse: without a GPU a film of half a million triangles takes minutes."""
-    terrain = v.plan.terrain
+    terrain = v.shown.terrain
     rows, columns = terrain.heights.shape
     low = v.plan.base_position[:, :2].min(0) - AROUND
     high = v.plan.base_position[:, :2].max(0) + AROUND
@@ -59,13 +59,14 @@ def _drawn_terrain(v: Validation) -> Heightfield:
 
 
 def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int], output: Path, seconds: float) -> None:
-    """Render the counted replay at `times` to `output` (an .mp4, or a folder of PNG files), in another process."""
-    trial = v.trials[0]
+    """Render the replay to look at, at `times` to `output` (an .mp4, or a folder of PNG files), in another process."""
+    trial = v.shown
     r = trial.replay
     at = np.minimum(np.searchsorted(r.t, times), len(r.t) - 1)
     with tempfile.TemporaryDirectory() as folder:
         model, frames = Path(folder) / "world.mjb", Path(folder) / "frames.npz"
-        world = build(v.model_path, _drawn_terrain(v), v.plan.robot.friction, v.plan.robot.gravity, cell=CELL)
+        robot, disturbance = v.plan.robot, v.settings.disturbance
+        world = build(v.model_path, _drawn_terrain(v), robot.friction, robot.gravity, disturbance=disturbance, cell=CELL)
         world.vis.quality.shadowsize = SHADOW
         mujoco.mj_saveModel(world, str(model), None)
         points = trial.reference.foot[at] - v.index.radius * trial.reference.normal[at]
@@ -104,8 +105,8 @@ def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int]
 
 
 def strip(v: Validation) -> list[tuple[float, bytes]]:
-    """A few pictures of the counted replay, (time, PNG)."""
-    end = float(v.trials[0].replay.t[-1])
+    """A few pictures of the replay to look at, (time, PNG)."""
+    end = float(v.shown.replay.t[-1])
     times = np.linspace(0.02, 0.98, PICTURES) * end
     with tempfile.TemporaryDirectory() as folder:
         _render(v, times, STRIP_SIZE, Path(folder), 60.0)
@@ -113,8 +114,8 @@ def strip(v: Validation) -> list[tuple[float, bytes]]:
 
 
 def video(v: Validation, target: Path) -> None:
-    """The counted replay as an MP4 at its natural speed."""
+    """The replay to look at, as an MP4 at its natural speed."""
     if ffmpeg() is None:
         raise FilmError(f"No film: ffmpeg was not found. {PACKAGES} Or: pip install imageio-ffmpeg")
-    end = float(v.trials[0].replay.t[-1])
+    end = float(v.shown.replay.t[-1])
     _render(v, np.arange(int(end * FRAMES_PER_SECOND) + 1) / FRAMES_PER_SECOND, FILM_SIZE, target, 60.0 + 30.0 * end)

@@ -12,7 +12,8 @@ import math
 import os
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -100,9 +101,23 @@ def _refuse_nonsense(options: argparse.Namespace) -> None:
         raise InputError(f"--rate {options.rate:g}: must be 500 Hz divided by a whole number, and at least 50")
 
 
+@contextmanager
+def _without_opengl() -> Iterator[None]:
+    """MuJoCo loads the OpenGL that $MUJOCO_GL names as it is imported, and fails where there is none; only the rendering process needs it."""
+    wished = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        os.environ.pop("MUJOCO_GL")
+        if wished is not None:
+            os.environ["MUJOCO_GL"] = wished
+
+
 def _run(options: argparse.Namespace, folder: Path) -> int:
     try:
-        from . import plan, report, scene, validation
+        with _without_opengl():
+            from . import plan, report, scene, validation
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco==3.17.0 daqp numpy scipy") from error
 
