@@ -19,8 +19,8 @@ const HAS_PACKAGE: &str = "import importlib.util, sys; \
 pub fn python() -> Result<PathBuf> {
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
         Error::input(
-            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it: \
-             python3 -m venv .venv && .venv/bin/pip install ./validate",
+            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it, in the \
+             folder of the repository: scripts/setup --python; or into an environment of yours: pip install ./validate",
         )
     })
 }

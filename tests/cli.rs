@@ -157,11 +157,16 @@ fn validate_hands_over_to_python() {
     let (_, out, _) = warpgait(folder.path(), &["--json", "validate", "a.plan.npz"]);
     assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
 
+    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
+    assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
+
     // A Python that crashes is neither "not trackable" nor an interruption.
     std::fs::write(bin.join("python"), "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\nkill -s SEGV $$\n").unwrap();
     let (code, _, err) = warpgait(folder.path(), &["validate", "a.plan.npz"]);
     assert_eq!(code, 2, "{err}");
     assert!(err.contains("crashed"), "{err}");
+    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
+    assert!(out.contains("\"error\""), "{out}");
 }
 
 /// A clone of the repository is a folder called `warpgait`: seen from above, Python takes it for a package.

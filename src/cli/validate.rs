@@ -11,7 +11,7 @@ pub(super) fn validate(arguments: &[OsString], console: &Console) -> Result<Endi
     let python = replay::python()?;
     let mut command = Command::new(&python);
     command.args(["-m", "warpgait.validate"]).args(arguments);
-    if console.is_json() {
+    if console.is_json() && !arguments.iter().any(|word| word == "--json") {
         command.arg("--json");
     }
     if console.is_quiet() {

@@ -45,8 +45,9 @@ def test_a_bad_plan_gives_exit_code_1_and_the_reason(
 def test_errors_give_exit_code_2_and_a_report_that_says_so(
     standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([str(tmp_path / "none.plan.npz")]) == 2
-    assert "no such file" in capsys.readouterr().err
+    assert main([str(tmp_path / "none.plan.npz"), "--json"]) == 2
+    said = capsys.readouterr()
+    assert "no such file" in said.err and "no such file" in json.loads(said.out)["error"]
 
     def rename(a: dict[str, Any]) -> None:
         meta = json.loads(str(a["meta"]))

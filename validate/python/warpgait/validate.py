@@ -201,12 +201,12 @@ def main(words: list[str] | None = None) -> int:
     try:
         _refuse_nonsense(options)
     except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
+        _say_error(options, str(error))
         return 2
     try:
         return _run(options, folder)
     except (InputError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        _say_error(options, str(error))
         if not options.no_files and options.plan.is_file() and folder.is_dir():
             _report_error(folder / f"{_stem(options.plan)}.report.json", options.plan.name, str(error))
         return 2
@@ -215,8 +215,14 @@ def main(words: list[str] | None = None) -> int:
         return 130
     except Exception:  # exit code 1 means "not trackable", which an error in this program must not say
         traceback.print_exc()
-        print("error: the replay itself failed, see above; please report it with the plan", file=sys.stderr)
+        _say_error(options, "the replay itself failed; please report it with the plan")
         return 2
+
+
+def _say_error(options: argparse.Namespace, message: str) -> None:
+    print(f"error: {message}", file=sys.stderr)
+    if options.json:
+        print(json.dumps({"plan": options.plan.name, "verdict": "error", "trackable": False, "error": message}))
 
 
 def _report_error(target: Path, plan: str, message: str) -> None:
