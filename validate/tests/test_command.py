@@ -57,6 +57,8 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     other = crawl.altered(standing_plan, tmp_path / "towr.plan.npz", rename)
     assert main([str(other)]) == 2
     assert "no full model" in capsys.readouterr().err
+    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file
+    assert "no folder for the reports" in capsys.readouterr().err
     assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
     before = sorted(standing_plan.parent.iterdir())

@@ -126,6 +126,11 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
             print(f"validate: {text}", file=sys.stderr)
 
     loaded = plan.load(options.plan)
+    if not options.no_files:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: no folder for the reports ({error.strerror}); name another one with --output") from error
     disturbance = scene.Disturbance(
         friction=options.friction,
         mass_factor=options.mass_factor,
@@ -157,7 +162,6 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
     """The report, the replay, and pictures and film as asked for."""
     from . import film, page, report
 
-    folder.mkdir(parents=True, exist_ok=True)
     stem = _stem(options.plan)
     pictures: list[tuple[float, bytes]] = []
     note = None
