@@ -184,7 +184,7 @@ impl Place {
         let _ = std::fs::remove_file(&result);
         let mut command = Command::new(&self.program);
         command
-            .args(["bench-case", case.work.name()])
+            .args(["bench-case", "--parent", &std::process::id().to_string(), case.work.name()])
             .args([&scenario, &self.plan(case), &result])
             .env("WARPGAIT_CACHE", &self.maps)
             .stdout(Stdio::null());
