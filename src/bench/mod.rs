@@ -53,7 +53,7 @@ pub struct Options {
     pub formulations: Vec<String>,
     /// Kinds of terrain.
     pub terrains: Vec<String>,
-    /// Wall time that a case may take.
+    /// Processor time that the process of a case may take; so may its replay.
     pub time_limit: Duration,
     /// Take finished cases of other builds of the program, too.
     pub any_program: bool,

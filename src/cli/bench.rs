@@ -42,7 +42,7 @@ pub(super) struct BenchArguments {
     /// Only these terrains
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(TERRAINS))]
     terrain: Vec<String>,
-    /// Wall time after which a case is given up
+    /// Processor time after which the process of a case is given up; of wall time, a tenth counts at least
     #[arg(long, value_name = "SECONDS", default_value_t = 900, value_parser = clap::value_parser!(u64).range(1..=86400))]
     time_limit: u64,
     /// Take finished cases of other builds of this program, too
