@@ -1,13 +1,15 @@
 //! Hip and knee of a swinging leg turn no faster than they can.
 //!
 //! ```text
-//!   −share ≤ (q(r_{k+1}) − q(r_k)) / (Δt · speed_limit) ≤ share,  q = (φ, κ),  r = Rᵀ(p_i − p)
+//!   −share ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ share,  q = (φ, κ),  r = Rᵀ(p_i − p)
 //! ```
 //!
 //! φ and κ are the angles of thigh and knee, see [`crate::leg`]. The abduction is slow and has no row. Legs of which the robot's file knows
 //! nothing have none either.
 //!
-//! Rows: thigh, knee for each pair of samples of which at least one lies in a swing; share of the limit.
+//! Over whole intervals a foot that is flicked over an edge within two of them would pass at half its true speed.
+//!
+//! Rows: thigh, knee for each half of an interval of which at least one end lies in a swing; share of the limit.
 
 use super::{Constraint, Place, reach};
 use crate::leg::Leg;
@@ -15,17 +17,18 @@ use crate::leg::jet::{Jet, Scalar};
 use crate::nlp::sink::Sink;
 use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
 
 /// Of the limit. The rest is for what happens between samples and for what the plan does not know: the legs' own mass moves the trunk against
 /// the centre of mass.
-const SHARE: f64 = 0.77;
+const SHARE: f64 = 0.74;
 
 /// Speeds of swinging legs.
 #[derive(Clone, Debug)]
 pub struct JointSpeed {
-    /// Foot, first sample of the pair, and the leg.
-    places: Vec<(usize, usize, Leg)>,
+    /// Foot, the ends of the half interval, and the leg.
+    places: Vec<(usize, [Instant; 2], Leg)>,
 }
 
 impl JointSpeed {
@@ -33,10 +36,13 @@ impl JointSpeed {
     pub fn new(model: &Model) -> Self {
         let mut places = Vec::new();
         for (i, leg) in model.legs.iter().enumerate() {
-            let swings = |k: usize| matches!(model.layout.phase[i][k], Phase::Swing(_));
+            let swings = |&at: &Instant| matches!(model.layout.phase_at(i, at), Phase::Swing(_));
             if let Some(leg) = leg {
-                let pairs = (0..model.layout.intervals).filter(|&k| swings(k) || swings(k + 1));
-                places.extend(pairs.map(|k| (i, k, *leg)));
+                let halves = (0..model.layout.intervals).flat_map(|k| {
+                    let middle = Instant::Between(k);
+                    [[Instant::Sample(k), middle], [middle, Instant::Sample(k + 1)]]
+                });
+                places.extend(halves.filter(|ends| ends.iter().any(swings)).map(|ends| (i, ends, *leg)));
             }
         }
         Self { places }
@@ -48,13 +54,13 @@ fn angles<T: Scalar>(leg: &Leg, r: [T; 3]) -> [T; 2] {
     leg.posture(r).angles()
 }
 
-fn jets(model: &Model, state: &State, (i, k, leg): &(usize, usize, Leg), after: usize) -> [Jet; 2] {
-    angles(leg, Jet::variables(&reach::value(model, state, (*i, k + after))))
+fn jets(model: &Model, state: &State, (i, ends, leg): &(usize, [Instant; 2], Leg), after: usize) -> [Jet; 2] {
+    angles(leg, Jet::variables(&reach::value(model, state, (*i, ends[after]))))
 }
 
-/// Of the row, by the angle at the sample `after` the first.
+/// Of the row, by the angle at the end `after`.
 fn scale(model: &Model, leg: &Leg, after: usize) -> f64 {
-    (2.0 * after as f64 - 1.0) / (model.layout.time_step * leg.speed_limit)
+    (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step * leg.speed_limit)
 }
 
 impl Constraint for JointSpeed {
@@ -72,9 +78,8 @@ impl Constraint for JointSpeed {
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, &(i, k, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let at = |k: usize| angles(&leg, reach::value(model, state, (i, k)).into());
-            let (before, after) = (at(k), at(k + 1));
+        for (rows, &(i, ends, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
+            let [before, after] = ends.map(|at| angles(&leg, reach::value(model, state, (i, at)).into()));
             for (j, row) in rows.iter_mut().enumerate() {
                 *row = (after[j] - before[j]) * scale(model, &leg, 1);
             }
@@ -84,7 +89,7 @@ impl Constraint for JointSpeed {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (n, place) in self.places.iter().enumerate() {
             for after in 0..2 {
-                let (at, scale) = ((place.0, place.1 + after), scale(model, &place.2, after));
+                let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
                 for (j, jet) in jets(model, state, place, after).iter().enumerate() {
                     reach::say_row(model, state, at, &(jet.first * scale), first + 2 * n + j, sink);
                 }
@@ -102,7 +107,7 @@ impl Constraint for JointSpeed {
     ) {
         for (lambda, place) in multipliers.chunks_exact(2).zip(&self.places) {
             for after in 0..2 {
-                let (at, scale) = ((place.0, place.1 + after), scale(model, &place.2, after));
+                let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
                 let [thigh, knee] = jets(model, state, place, after);
                 let sum = thigh * (lambda[0] * scale) + knee * (lambda[1] * scale);
                 reach::say_quadratic(model, state, at, &sum.second, sink);
@@ -112,7 +117,7 @@ impl Constraint for JointSpeed {
     }
 
     fn place(&self, row: usize) -> Place {
-        let (i, k, _) = self.places[row / 2];
-        Place { foot: Some(i), sample: k as f64 + 0.5 }
+        let (i, [start, end], _) = self.places[row / 2];
+        Place { foot: Some(i), sample: 0.5 * (start.time() + end.time()) }
     }
 }

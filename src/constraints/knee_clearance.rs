@@ -17,6 +17,7 @@ use crate::leg::jet::{Jet, Scalar};
 use crate::nlp::sink::Sink;
 use crate::nlp::state::{Curvature, Tangent};
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
 /// Samples between two that are looked at.
@@ -27,7 +28,7 @@ const MARGIN: f64 = 0.02;
 /// Knees over the ground.
 #[derive(Clone, Debug)]
 pub struct KneeClearance {
-    places: Vec<(usize, usize, Leg)>,
+    places: Vec<(usize, Instant, Leg)>,
 }
 
 impl KneeClearance {
@@ -36,7 +37,7 @@ impl KneeClearance {
         let mut places = Vec::new();
         for (i, leg) in model.legs.iter().enumerate() {
             if let Some(leg) = leg {
-                places.extend((0..=model.layout.intervals).step_by(STRIDE).map(|k| (i, k, *leg)));
+                places.extend((0..=model.layout.intervals).step_by(STRIDE).map(|k| (i, k.into(), *leg)));
             }
         }
         Self { places }
@@ -63,14 +64,14 @@ struct Moved {
 }
 
 impl Moved {
-    fn new(model: &Model, state: &State, (i, k): (usize, usize), local: [Jet; 3]) -> Self {
-        let base = &state.base[k];
+    fn new(model: &Model, state: &State, (i, at): (usize, Instant), local: [Jet; 3]) -> Self {
+        let base = state.base_at(at);
         let rotation = base.rotation();
         let out = rotation * Vector3::from_fn(|c, _| local[c].value);
         let q = base.position() + out;
         let by_r = Matrix3::from_fn(|c, d| local[c].first[d]);
         let with_foot = rotation * by_r * rotation.transpose();
-        let arm = cross_matrix(&(state.foot(model, i, k).point.position - base.position()));
+        let arm = cross_matrix(&reach::arm(model, state, (i, at)));
         Self {
             local,
             distance: distance(&q, &model.ground.jet(q.x, q.y)),
@@ -87,19 +88,14 @@ impl Moved {
 
 impl KneeClearance {
     fn moved(&self, model: &Model, state: &State, place: usize) -> [Moved; 2] {
-        let (i, k, leg) = &self.places[place];
-        let r = reach::value(model, state, (*i, *k));
-        points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *k), local))
+        let (i, at, leg) = &self.places[place];
+        let r = reach::value(model, state, (*i, *at));
+        points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *at), local))
     }
 
     fn tangents<'a>(&self, model: &'a Model, state: &'a State, place: usize) -> [Tangent<'a>; 3] {
-        let (i, k, _) = self.places[place];
-        let (base, foot, node) = (&state.base[k], state.foot(model, i, k), &model.layout.base[k]);
-        [
-            Tangent::turn(model, base, node),
-            Tangent::position(model, &base.point, node),
-            Tangent::position(model, &foot.point, state.foot_node(i, k)),
-        ]
+        let (i, at, _) = self.places[place];
+        reach::tangents(model, state, (i, at))
     }
 }
 
@@ -120,8 +116,8 @@ impl Constraint for KneeClearance {
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, (i, k, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let (base, r) = (&state.base[*k], reach::value(model, state, (*i, *k)));
+        for (rows, (i, at, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
+            let (base, r) = (state.base_at(*at), reach::value(model, state, (*i, *at)));
             for (row, local) in rows.iter_mut().zip(points(leg, r.into())) {
                 let q = base.position() + base.rotation() * Vector3::from(local);
                 *row = distance(&q, &model.ground.jet(q.x, q.y)).0;
@@ -150,8 +146,8 @@ impl Constraint for KneeClearance {
         sink: &mut Sink,
     ) {
         for (place, lambda) in multipliers.chunks_exact(2).enumerate() {
-            let (i, k, _) = self.places[place];
-            let rotation = state.base[k].rotation();
+            let (i, at, _) = self.places[place];
+            let rotation = state.base_at(at).rotation();
             let [turn, base, foot] = self.tangents(model, state, place);
             for (moved, lambda) in self.moved(model, state, place).iter().zip(lambda) {
                 // The ground's curvature, and the normal's.
@@ -165,9 +161,8 @@ impl Constraint for KneeClearance {
                 base.cross(&(by_base.transpose() * form * by_foot), &foot, sink);
                 // w · d²q for q = p + R v(r): w · d²p, w · d²R v, w · dR dv, w · R d²v.
                 let w = moved.distance.1 * *lambda;
-                curvature.base_position[k] += w;
                 let v = Vector3::from_fn(|c, _| moved.local[c].value);
-                curvature.base_rotation[k] += w * v.transpose();
+                curvature.add_base(at, &w, &(w * v.transpose()));
                 // (δ × R dv) · w = −δᵀ [w] (R dv), R dv = R ∂v/∂r Rᵀ ([arm] δ + dp_i − dp).
                 let mixed = -cross_matrix(&w) * moved.with_foot;
                 turn.cross(&(mixed * moved.arm), &turn, sink);
@@ -175,14 +170,14 @@ impl Constraint for KneeClearance {
                 turn.cross(&-mixed, &base, sink);
                 let u = rotation.tr_mul(&w);
                 let sum = moved.local[0] * u.x + moved.local[1] * u.y + moved.local[2] * u.z;
-                reach::say_quadratic(model, state, (i, k), &sum.second, sink);
-                reach::say_curvature(model, state, (i, k), &sum.first, curvature, sink);
+                reach::say_quadratic(model, state, (i, at), &sum.second, sink);
+                reach::say_curvature(model, state, (i, at), &sum.first, curvature, sink);
             }
         }
     }
 
     fn place(&self, row: usize) -> Place {
-        let (i, k, _) = self.places[row / 2];
-        Place { foot: Some(i), sample: k as f64 }
+        let (i, at, _) = self.places[row / 2];
+        Place { foot: Some(i), sample: at.time() }
     }
 }

@@ -10,6 +10,7 @@ use super::{Constraint, Place};
 use crate::nlp::sink::Sink;
 use crate::nlp::state::{Curvature, Tangent};
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::cross_matrix;
 use nalgebra::{Matrix3, Vector3};
@@ -49,78 +50,92 @@ impl Reach {
     }
 }
 
-/// r = Rᵀ(p_i − p) of a foot at a sample and its derivatives, also used by costs.
+/// r = Rᵀ(p_i − p) of a foot at an instant, m; also used by costs and by rows of the legs.
+pub(crate) fn value(model: &Model, state: &State, (i, at): (usize, impl Into<Instant>)) -> Vector3<f64> {
+    let at = at.into();
+    let base = state.base_at(at);
+    base.rotation().tr_mul(&(state.foot(model, i, at).point.position - base.position()))
+}
+
+/// Its derivatives: a row that changes by `by` · (change of r).
 pub(crate) fn say_row(
     model: &Model,
     state: &State,
-    (i, k): (usize, usize),
+    (i, at): (usize, impl Into<Instant>),
     by: &Vector3<f64>,
     row: usize,
     sink: &mut Sink,
 ) {
-    let (base, foot) = (&state.base[k], state.foot(model, i, k));
-    let world = base.rotation() * by;
-    let arm = foot.point.position - base.position();
-    let node = &model.layout.base[k];
+    let at = at.into();
+    let world = state.base_at(at).rotation() * by;
+    let arm = arm(model, state, (i, at));
+    let [turn, base, foot] = tangents(model, state, (i, at));
     // d(Rᵀ r) = Rᵀ ([r] δ + dp_i − dp).
-    Tangent::turn(model, base, node).row(row, &(-arm.cross(&world)), sink);
-    Tangent::position(model, &base.point, node).row(row, &-world, sink);
-    Tangent::position(model, &foot.point, state.foot_node(i, k)).row(row, &world, sink);
+    turn.row(row, &(-arm.cross(&world)), sink);
+    base.row(row, &-world, sink);
+    foot.row(row, &world, sink);
 }
 
 /// Second derivatives of λ · Rᵀ(p_i − p).
 pub(crate) fn say_curvature(
     model: &Model,
     state: &State,
-    (i, k): (usize, usize),
+    (i, at): (usize, impl Into<Instant>),
     lambda: &Vector3<f64>,
     curvature: &mut Curvature,
     sink: &mut Sink,
 ) {
-    let (base, foot) = (&state.base[k], state.foot(model, i, k));
-    let arm = foot.point.position - base.position();
-    let world = base.rotation() * lambda;
-    curvature.base_rotation[k] += arm * lambda.transpose();
-    curvature.base_position[k] -= world;
-    curvature.add_foot(model, i, k, world);
+    let at = at.into();
+    let world = state.base_at(at).rotation() * lambda;
+    curvature.add_base(at, &-world, &(arm(model, state, (i, at)) * lambda.transpose()));
+    curvature.add_foot(model, i, at, world);
     // (δ × Rλ) · (dp_i − dp) = δᵀ [Rλ] (dp_i − dp).
     let form = cross_matrix(&world);
-    let node = &model.layout.base[k];
-    let turn = Tangent::turn(model, base, node);
-    turn.cross(&form, &Tangent::position(model, &foot.point, state.foot_node(i, k)), sink);
-    turn.cross(&-form, &Tangent::position(model, &base.point, node), sink);
+    let [turn, base, foot] = tangents(model, state, (i, at));
+    turn.cross(&form, &foot, sink);
+    turn.cross(&-form, &base, sink);
 }
 
 /// Second derivatives of ½ (change of r)ᵀ Q (change of r), Q symmetric, base frame; those of r itself are not in it.
 pub(crate) fn say_quadratic(
     model: &Model,
     state: &State,
-    (i, k): (usize, usize),
+    (i, at): (usize, impl Into<Instant>),
     form: &Matrix3<f64>,
     sink: &mut Sink,
 ) {
-    let (base, foot) = (&state.base[k], state.foot(model, i, k));
-    let r = base.rotation();
+    let at = at.into();
+    let r = state.base_at(at).rotation();
     let form = r * form * r.transpose();
     // R (change of r) = [arm] δ + dp_i − dp.
-    let arm = cross_matrix(&(foot.point.position - base.position()));
+    let arm = cross_matrix(&arm(model, state, (i, at)));
     let by_turn = arm.transpose() * form;
-    let node = &model.layout.base[k];
-    let turn = Tangent::turn(model, base, node);
-    let body = Tangent::position(model, &base.point, node);
-    let foot = Tangent::position(model, &foot.point, state.foot_node(i, k));
+    let [turn, base, foot] = tangents(model, state, (i, at));
     turn.quadratic(&(by_turn * arm), sink);
-    body.quadratic(&form, sink);
+    base.quadratic(&form, sink);
     foot.quadratic(&form, sink);
     turn.cross(&by_turn, &foot, sink);
-    turn.cross(&-by_turn, &body, sink);
-    body.cross(&-form, &foot, sink);
+    turn.cross(&-by_turn, &base, sink);
+    base.cross(&-form, &foot, sink);
 }
 
-/// r = Rᵀ(p_i − p), m.
-pub(crate) fn value(model: &Model, state: &State, (i, k): (usize, usize)) -> Vector3<f64> {
-    let base = &state.base[k];
-    base.rotation().tr_mul(&(state.foot(model, i, k).point.position - base.position()))
+/// p_i − p, m.
+pub(crate) fn arm(model: &Model, state: &State, (i, at): (usize, Instant)) -> Vector3<f64> {
+    state.foot(model, i, at).point.position - state.base_at(at).position()
+}
+
+/// How the base turns, the base moves and the foot moves.
+pub(crate) fn tangents<'a>(
+    model: &'a Model,
+    state: &'a State,
+    (i, at): (usize, Instant),
+) -> [Tangent<'a>; 3] {
+    let (base, node) = (state.base_at(at), model.layout.base_at(at));
+    [
+        Tangent::turn(model, base, node),
+        Tangent::position(model, &base.point, node),
+        Tangent::position(model, &state.foot(model, i, at).point, state.foot_node(i, at)),
+    ]
 }
 
 impl Constraint for Reach {

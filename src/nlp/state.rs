@@ -10,7 +10,7 @@ use crate::trajectory::rotation::{RotationJet, skew_part};
 use crate::trajectory::space::PointJet;
 use crate::trajectory::spline::SwingBasis;
 use crate::trajectory::switches::TimedNode;
-use crate::trajectory::{Layout, LinearNode};
+use crate::trajectory::{Instant, Layout, LinearNode};
 use crate::warp::Order;
 
 /// The base at a sample.
@@ -68,12 +68,17 @@ pub struct SwingPoint {
 pub struct State {
     /// By sample.
     pub base: Vec<BaseNode>,
+    /// Half way from each sample to the next; empty where the geometry of no leg is known.
+    pub base_between: Vec<BaseNode>,
     /// By sample, (p̄, θ̄) and its first and second derivatives in time.
     pub base_motion: Vec<[[f64; 6]; 3]>,
     /// `contacts[foot][stance]`.
     pub contacts: Vec<Vec<FootNode>>,
     /// `swings[foot][k]`; stale where the foot stands.
     pub swings: Vec<Vec<FootNode>>,
+    /// `swings_between[foot][k]`: half way from each sample to the next; empty where the leg's geometry is not known, stale
+    /// where the foot stands.
+    pub swings_between: Vec<Vec<FootNode>>,
     /// `points[foot]`: the middle of each swing, and where switches are variables more points of its path.
     pub points: Vec<Vec<FootNode>>,
     /// Which these are.
@@ -90,6 +95,7 @@ pub struct State {
     /// `switches[foot][swing]`: lift-off and touch-down, in samples.
     pub switches: Vec<Vec<[f64; 2]>>,
     foot_nodes: Vec<Vec<TimedNode>>,
+    foot_nodes_between: Vec<Vec<TimedNode>>,
     force_nodes: Vec<Vec<Option<TimedNode>>>,
     basis: SwingBasis,
 }
@@ -113,12 +119,18 @@ impl State {
         let foot = FootNode { point, ground: HeightJet::default() };
         let samples = layout.intervals + 1;
         let feet = model.feet();
+        let between = |i: usize| 0..if model.legs[i].is_some() { layout.intervals } else { 0 };
         let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(layout, i)).collect();
         Self {
             base: vec![BaseNode { point, turn }; samples],
+            base_between: vec![
+                BaseNode { point, turn };
+                (0..feet).map(|i| between(i).end).max().unwrap_or(0)
+            ],
             base_motion: vec![[[0.0; 6]; 3]; samples],
             contacts: layout.feet.iter().map(|f| vec![foot; f.stances.len()]).collect(),
             swings: vec![vec![foot; samples]; feet],
+            swings_between: (0..feet).map(|i| between(i).map(|_| foot).collect()).collect(),
             points: swing_points.iter().map(|points| vec![foot; points.len()]).collect(),
             swing_points,
             warped_forces: vec![vec![Vector3::zeros(); samples]; feet],
@@ -126,7 +138,12 @@ impl State {
             warped_full_forces: vec![vec![Vector3::zeros(); samples]; feet],
             full_forces: vec![vec![Vector3::zeros(); samples]; feet],
             switches: layout.feet.iter().map(|f| vec![[0.0; 2]; f.swings.len()]).collect(),
-            foot_nodes: (0..feet).map(|i| (0..samples).map(|k| layout.timed_foot(i, k)).collect()).collect(),
+            foot_nodes: (0..feet)
+                .map(|i| (0..samples).map(|k| layout.timed_foot(i, Instant::Sample(k))).collect())
+                .collect(),
+            foot_nodes_between: (0..feet)
+                .map(|i| between(i).map(|k| layout.timed_foot(i, Instant::Between(k))).collect())
+                .collect(),
             force_nodes: (0..feet)
                 .map(|i| (0..samples).map(|k| layout.timed_force(i, k)).collect())
                 .collect(),
@@ -147,6 +164,10 @@ impl State {
             let (point, turn) = model.space.pose(&y, curved);
             self.base[k] = BaseNode { point, turn };
             self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
+        }
+        for (between, node) in self.base_between.iter_mut().zip(&layout.base_between) {
+            let (point, turn) = model.space.pose(&node.value::<6>(x), curved);
+            *between = BaseNode { point, turn };
         }
         for (i, foot) in layout.feet.iter().enumerate() {
             for (swing, times) in foot.swings.iter().zip(&mut self.switches[i]) {
@@ -173,15 +194,32 @@ impl State {
                     self.swings[i][k] = foot_at(&timed.node, order);
                 }
             }
+            for (k, timed) in self.foot_nodes_between[i].iter_mut().enumerate() {
+                if let Phase::Swing(_) = layout.phase_at(i, Instant::Between(k)) {
+                    timed.update(&self.basis, x);
+                    self.swings_between[i][k] = foot_at(&timed.node, order);
+                }
+            }
             for (at, point) in self.swing_points[i].iter().zip(&mut self.points[i]) {
                 *point = foot_at(&at.node, order);
             }
         }
     }
 
-    /// A foot at a sample in terms of the variables, at the present x.
-    pub fn foot_node(&self, foot: usize, k: usize) -> &LinearNode {
-        &self.foot_nodes[foot][k].node
+    /// The base at an instant.
+    pub fn base_at(&self, instant: Instant) -> &BaseNode {
+        match instant {
+            Instant::Sample(k) => &self.base[k],
+            Instant::Between(k) => &self.base_between[k],
+        }
+    }
+
+    /// A foot at an instant in terms of the variables, at the present x.
+    pub fn foot_node(&self, foot: usize, instant: impl Into<Instant>) -> &LinearNode {
+        match instant.into() {
+            Instant::Sample(k) => &self.foot_nodes[foot][k].node,
+            Instant::Between(k) => &self.foot_nodes_between[foot][k].node,
+        }
     }
 
     /// The force f̄ of a foot at a sample in terms of the variables, at the present x, if it may bear something there, and its
@@ -191,11 +229,13 @@ impl State {
         self.force_nodes[foot][k].as_ref().map(|timed| (stance, &timed.node))
     }
 
-    /// A foot at a sample, in stance or in swing.
-    pub fn foot(&self, model: &Model, foot: usize, k: usize) -> &FootNode {
-        match model.layout.phase[foot][k] {
-            Phase::Stance(j) => &self.contacts[foot][j],
-            Phase::Swing(_) => &self.swings[foot][k],
+    /// A foot at an instant, in stance or in swing.
+    pub fn foot(&self, model: &Model, foot: usize, instant: impl Into<Instant>) -> &FootNode {
+        let instant = instant.into();
+        match (model.layout.phase_at(foot, instant), instant) {
+            (Phase::Stance(j), _) => &self.contacts[foot][j],
+            (Phase::Swing(_), Instant::Sample(k)) => &self.swings[foot][k],
+            (Phase::Swing(_), Instant::Between(k)) => &self.swings_between[foot][k],
         }
     }
 }
@@ -223,10 +263,14 @@ pub struct Curvature {
     pub base_position: Vec<Vector3<f64>>,
     /// ∂L/∂R by sample.
     pub base_rotation: Vec<Matrix3<f64>>,
+    /// ∂L/∂p and ∂L/∂R half way from each sample to the next, as in [`State::base_between`].
+    pub base_between: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// ∂L/∂p_i, `[foot][stance]`.
     pub contacts: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂p_i, `[foot][k]`.
     pub swings: Vec<Vec<Vector3<f64>>>,
+    /// ∂L/∂p_i, as in [`State::swings_between`].
+    pub swings_between: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂p_i, `[foot]` and as in [`State::points`].
     pub points: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂f_i, `[foot][k]`.
@@ -244,8 +288,10 @@ impl Curvature {
         Self {
             base_position: vec![Vector3::zeros(); state.base.len()],
             base_rotation: vec![Matrix3::zeros(); state.base.len()],
+            base_between: vec![(Vector3::zeros(), Matrix3::zeros()); state.base_between.len()],
             contacts: zeros(&state.contacts),
             swings: zeros(&state.swings),
+            swings_between: zeros(&state.swings_between),
             points: zeros(&state.points),
             forces: state.forces.clone(),
             full_forces: state.forces.clone(),
@@ -257,9 +303,11 @@ impl Curvature {
     pub fn clear(&mut self) {
         self.base_position.fill(Vector3::zeros());
         self.base_rotation.fill(Matrix3::zeros());
+        self.base_between.fill((Vector3::zeros(), Matrix3::zeros()));
         for list in [
             &mut self.contacts,
             &mut self.swings,
+            &mut self.swings_between,
             &mut self.points,
             &mut self.forces,
             &mut self.full_forces,
@@ -271,34 +319,38 @@ impl Curvature {
         }
     }
 
-    /// Adds ∂L/∂p_i of a foot at a sample.
-    pub fn add_foot(&mut self, model: &Model, foot: usize, k: usize, value: Vector3<f64>) {
-        match model.layout.phase[foot][k] {
-            Phase::Stance(j) => self.contacts[foot][j] += value,
-            Phase::Swing(_) => self.swings[foot][k] += value,
+    /// Adds ∂L/∂p_i of a foot at an instant.
+    pub fn add_foot(&mut self, model: &Model, foot: usize, instant: impl Into<Instant>, value: Vector3<f64>) {
+        let instant = instant.into();
+        match (model.layout.phase_at(foot, instant), instant) {
+            (Phase::Stance(j), _) => self.contacts[foot][j] += value,
+            (Phase::Swing(_), Instant::Sample(k)) => self.swings[foot][k] += value,
+            (Phase::Swing(_), Instant::Between(k)) => self.swings_between[foot][k] += value,
         }
+    }
+
+    /// Adds ∂L/∂p and ∂L/∂R of the base at an instant.
+    pub fn add_base(&mut self, instant: Instant, position: &Vector3<f64>, rotation: &Matrix3<f64>) {
+        let (by_position, by_rotation) = match instant {
+            Instant::Sample(k) => (&mut self.base_position[k], &mut self.base_rotation[k]),
+            Instant::Between(k) => {
+                let (by_position, by_rotation) = &mut self.base_between[k];
+                (by_position, by_rotation)
+            }
+        };
+        *by_position += position;
+        *by_rotation += rotation;
     }
 
     /// Says Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all constraints have added their weights.
     pub fn say(&self, model: &Model, state: &State, sink: &mut Sink) {
         let layout = &model.layout;
         for (k, base) in state.base.iter().enumerate() {
-            let node = &layout.base[k];
-            // ⟨Λ, ∂_d ∂_e R⟩ with Q = Λ Rᵀ: ∂_e w_d · skew(Q) + w_eᵀ Q w_d − (w_d · w_e) tr Q.
-            let q = self.base_rotation[k] * base.rotation().transpose();
-            let (axis, trace) = (skew_part(&q), q.trace());
-            let w = &base.turn.first;
-            let first = if model.space.is_warped() { 0 } else { 3 };
-            for d in first..6 {
-                for e in first..=d {
-                    let mut value =
-                        base.turn.second[e][d].dot(&axis) + w[e].dot(&(q * w[d])) - w[d].dot(&w[e]) * trace;
-                    if d < 3 {
-                        value += self.base_position[k].dot(&base.point.first[e].column(d));
-                    }
-                    sink.own(node, d, e, value);
-                }
-            }
+            say_base(model, base, &layout.base[k], &self.base_position[k], &self.base_rotation[k], sink);
+        }
+        for (k, base) in state.base_between.iter().enumerate() {
+            let (position, rotation) = &self.base_between[k];
+            say_base(model, base, &layout.base_between[k], position, rotation, sink);
         }
         self.say_switches(model, state, sink);
         if model.space.is_warped() {
@@ -354,6 +406,12 @@ impl Curvature {
                     position(sink, &timed.node, &state.swings[i][k].point, &self.swings[i][k]);
                 }
             }
+            for (k, timed) in state.foot_nodes_between[i].iter().enumerate() {
+                if let Phase::Swing(_) = layout.phase_at(i, Instant::Between(k)) {
+                    let point = &state.swings_between[i][k].point;
+                    position(sink, &timed.node, point, &self.swings_between[i][k]);
+                }
+            }
             for (n, at) in state.swing_points[i].iter().enumerate() {
                 position(sink, &at.node, &state.points[i][n].point, &self.points[i][n]);
             }
@@ -368,6 +426,11 @@ impl Curvature {
                 let weight = state.swings[i][k].point.jacobian.tr_mul(&self.swings[i][k]);
                 say_timed(timed, &weight, sink);
             }
+            let between = state.foot_nodes_between[i].iter().enumerate();
+            for (k, timed) in between.filter(|(_, t)| t.is_timed()) {
+                let jacobian = &state.swings_between[i][k].point.jacobian;
+                say_timed(timed, &jacobian.tr_mul(&self.swings_between[i][k]), sink);
+            }
             for (k, timed) in state.force_nodes[i].iter().enumerate() {
                 let Some(timed) = timed.as_ref().filter(|t| t.is_timed()) else { continue };
                 let Some((j, _)) = layout.force(i, k) else { continue };
@@ -375,6 +438,32 @@ impl Curvature {
                 let weight = jacobian.tr_mul(&self.forces[i][k]) + self.warped_forces[i][k];
                 say_timed(timed, &weight, sink);
             }
+        }
+    }
+}
+
+/// Says ∂L/∂p · ∂²p and ⟨∂L/∂R, ∂²R⟩ of the base.
+fn say_base(
+    model: &Model,
+    base: &BaseNode,
+    node: &LinearNode,
+    by_position: &Vector3<f64>,
+    by_rotation: &Matrix3<f64>,
+    sink: &mut Sink,
+) {
+    // ⟨Λ, ∂_d ∂_e R⟩ with Q = Λ Rᵀ: ∂_e w_d · skew(Q) + w_eᵀ Q w_d − (w_d · w_e) tr Q.
+    let q = by_rotation * base.rotation().transpose();
+    let (axis, trace) = (skew_part(&q), q.trace());
+    let w = &base.turn.first;
+    let first = if model.space.is_warped() { 0 } else { 3 };
+    for d in first..6 {
+        for e in first..=d {
+            let mut value =
+                base.turn.second[e][d].dot(&axis) + w[e].dot(&(q * w[d])) - w[d].dot(&w[e]) * trace;
+            if d < 3 {
+                value += by_position.dot(&base.point.first[e].column(d));
+            }
+            sink.own(node, d, e, value);
         }
     }
 }

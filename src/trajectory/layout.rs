@@ -14,6 +14,7 @@
 use std::ops::Range;
 
 use super::gait::{Gait, Stance, Swing};
+use super::instant::Instant;
 use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
 use super::switches::{self, TimedNode};
 
@@ -157,6 +158,8 @@ pub struct Layout {
     pub base_intervals: usize,
     /// The base at each sample, six components.
     pub base: Vec<LinearNode>,
+    /// Half way from each sample to the next.
+    pub base_between: Vec<LinearNode>,
     /// Velocity and acceleration of the base at each sample, six components.
     pub base_rates: Vec<[LinearNode; 2]>,
     /// Distinct control points of the base.
@@ -186,6 +189,7 @@ impl Layout {
             variables: 6 * base_blocks,
             base_intervals,
             base: Vec::new(),
+            base_between: Vec::new(),
             base_rates: Vec::new(),
             base_blocks,
             feet: Vec::new(),
@@ -193,6 +197,7 @@ impl Layout {
             nearest_stance: Vec::new(),
         };
         layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
+        layout.base_between = (0..intervals).map(|k| layout.base_node(k as f64 + 0.5, 0)).collect();
         layout.base_rates = (0..=intervals)
             .map(|k| [1, 2].map(|derivative| layout.base_node(k as f64, derivative)))
             .collect();
@@ -240,19 +245,9 @@ impl Layout {
     }
 
     fn set_phases(&mut self, foot: usize) {
-        let swings = &self.feet[foot].swings;
-        let samples = 0..=self.intervals;
-        self.nearest_stance[foot] =
-            samples.clone().map(|k| swings.iter().filter(|s| s.swing.middle() < k as f64).count()).collect();
-        self.phase[foot] = samples
-            .map(|k| {
-                let within = |[start, end]: [f64; 2]| start < k as f64 && (k as f64) < end;
-                match swings.iter().position(|s| within(s.swing.span())) {
-                    Some(j) => Phase::Swing(j),
-                    None => Phase::Stance(self.nearest_stance[foot][k]),
-                }
-            })
-            .collect();
+        let times = (0..=self.intervals).map(|k| k as f64);
+        self.nearest_stance[foot] = times.clone().map(|time| self.stance_near(foot, time)).collect();
+        self.phase[foot] = times.map(|time| self.phase_of(foot, time)).collect();
     }
 
     /// Takes the switches from x for good: from now on phases, feet and forces are those of the motion x.
@@ -339,6 +334,33 @@ impl Layout {
         node
     }
 
+    /// The base at an instant, six components.
+    pub fn base_at(&self, instant: Instant) -> &LinearNode {
+        match instant {
+            Instant::Sample(k) => &self.base[k],
+            Instant::Between(k) => &self.base_between[k],
+        }
+    }
+
+    /// What a foot does at an instant.
+    pub fn phase_at(&self, foot: usize, instant: Instant) -> Phase {
+        match instant {
+            Instant::Sample(k) => self.phase[foot][k],
+            Instant::Between(_) => self.phase_of(foot, instant.time()),
+        }
+    }
+
+    fn phase_of(&self, foot: usize, time: f64) -> Phase {
+        let within = |[start, end]: [f64; 2]| start < time && time < end;
+        let swing = self.feet[foot].swings.iter().position(|s| within(s.swing.span()));
+        swing.map_or_else(|| Phase::Stance(self.stance_near(foot, time)), Phase::Swing)
+    }
+
+    /// The stance that is nearest to a time in samples.
+    fn stance_near(&self, foot: usize, time: f64) -> usize {
+        self.feet[foot].swings.iter().filter(|s| s.swing.middle() < time).count()
+    }
+
     /// A foot at time `k` in samples: its position, velocity or acceleration (in the space of the variables), with switches
     /// at their nominal or frozen times.
     pub fn foot_node(&self, foot: usize, k: f64, derivative: usize) -> LinearNode {
@@ -355,8 +377,7 @@ impl Layout {
         if derivative > 0 {
             return LinearNode::default();
         }
-        let stance = variables.swings.iter().filter(|s| s.swing.middle() < k).count();
-        variables.stances[stance].foothold.clone()
+        variables.stances[self.stance_near(foot, k)].foothold.clone()
     }
 
     /// A foot at u ∈ [0, 1] of swing `j`, or a derivative with respect to u.
@@ -381,14 +402,14 @@ impl Layout {
         })
     }
 
-    /// A foot at sample `k`, following its switches where these are variables.
-    pub fn timed_foot(&self, foot: usize, k: usize) -> TimedNode {
-        if let Phase::Swing(j) = self.phase[foot][k]
+    /// A foot at an instant, following its switches where these are variables.
+    pub fn timed_foot(&self, foot: usize, instant: Instant) -> TimedNode {
+        if let Phase::Swing(j) = self.phase_at(foot, instant)
             && let Some(lift_off) = self.feet[foot].swings[j].switches
         {
-            return TimedNode::moving(k, self.swing_variables(foot, j), lift_off);
+            return TimedNode::moving(instant.time(), self.swing_variables(foot, j), lift_off);
         }
-        TimedNode::given(self.foot_node(foot, k as f64, 0))
+        TimedNode::given(self.foot_node(foot, instant.time(), 0))
     }
 
     /// The force f̄ of a foot at sample `k`, if it may bear something there, following its switches where these are variables.

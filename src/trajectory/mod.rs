@@ -4,6 +4,7 @@
 //! [`crate::nlp::state`].
 
 pub mod gait;
+pub mod instant;
 pub mod layout;
 pub mod rotation;
 pub mod sampling;
@@ -12,4 +13,5 @@ pub mod spline;
 pub mod switches;
 
 pub use gait::{Gait, Stance, Swing};
+pub use instant::Instant;
 pub use layout::{Layout, LinearNode};

@@ -127,7 +127,7 @@ pub fn share(k: usize, touch_down: Option<f64>, lift_off: Option<f64>) -> f64 {
 enum Timing {
     /// Not at all.
     Given,
-    /// A foot in or near a swing, at this sample.
+    /// A foot in or near a swing, at this time in samples.
     Moving(f64),
     /// A force after touch-down: the ramp's argument is this minus the switch.
     Rising(f64),
@@ -153,9 +153,9 @@ impl TimedNode {
         Self { node, mixed: Vec::new(), second: [[0.0; 3]; 3], timing: Timing::Given }
     }
 
-    /// A foot at sample k of a swing from foothold to foothold by way of control points, with switches at `lift_off` and
+    /// A foot at time k, in samples, of a swing from foothold to foothold by way of control points, with switches at `lift_off` and
     /// the variable after it.
-    pub fn moving(k: usize, variables: [usize; 5], lift_off: usize) -> Self {
+    pub fn moving(k: f64, variables: [usize; 5], lift_off: usize) -> Self {
         Self {
             node: LinearNode {
                 terms: variables.map(|v| (v, 0.0)).to_vec(),
@@ -163,7 +163,7 @@ impl TimedNode {
             },
             mixed: vec![[0.0; 2]; variables.len()],
             second: [[0.0; 3]; 3],
-            timing: Timing::Moving(k as f64),
+            timing: Timing::Moving(k),
         }
     }
 

@@ -17,6 +17,7 @@ from .model import Indices
 from .plan import Array, Bools
 from .reference import Reference
 
+IN_THE_AIR = 0.05  # the friction that is counted on where a foot does not touch yet
 EDGES = 8  # of the pyramid inside the friction cone: 92 % of its width
 
 
@@ -104,6 +105,7 @@ class WholeBody:
         self._contact_jacobian = np.zeros((E, 3, nv))
         self._jacobian_rate = np.zeros((3, nv))
         self._cones = friction_cones(reference.normal, friction)
+        self._narrow = friction_cones(reference.normal, IN_THE_AIR)
         self._last = np.zeros((E, 3))
 
     def _tasks(self, k: int, data: Any, touching: Bools, bias: Array) -> Array:
@@ -175,8 +177,9 @@ class WholeBody:
             first = 6 + m + rows * j
             C[first : first + rows, nv + 3 * j : nv + 3 * j + 3] = self._cones[k, e]
             lower[first + EDGES] = g.least_normal_force
-            if not touching[e]:  # to count on a force that is not there, push or pull, would throw the leg
+            if not touching[e]:  # to count on a force that is not there, push, pull or friction, would throw the leg
                 upper[first + EDGES] = g.touch_force
+                C[first : first + EDGES, nv + 3 * j : nv + 3 * j + 3] = self._narrow[k, e, :EDGES]
             elif self.pull[e] > 0:
                 lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
                 lower[first + EDGES] = -self.pull[e]

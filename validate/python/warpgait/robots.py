@@ -52,7 +52,7 @@ class ShankShape:
 
 
 def shank_shape(model: Any, leg: Leg) -> ShankShape:
-    """Read off the collision shapes of the body that carries the foot of `leg`."""
+    """Read off the collision shapes of the body that carries the foot of `leg`, and of the thigh above it."""
     body = model.geom_bodyid[model.geom(leg.name).id]
     radius, corner = 0.0, (0.0, 0.0)
     foot = np.array([np.sin(leg.shank_zero), -np.cos(leg.shank_zero)])  # from the knee, x and z at zero joint angles
@@ -71,6 +71,11 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
         furthest = corners[np.argmax(corners @ outward)]
         if furthest @ outward > corner[1]:
             corner = (float(furthest @ foot), float(furthest @ outward))
+    # The lower end of the thigh turns about the same axis.
+    axis = model.body_pos[body]
+    for g in np.flatnonzero(model.geom_bodyid == model.body_parentid[body]):
+        if np.hypot(*(model.geom_pos[g] - axis)[[0, 2]]) < 0.01:
+            radius = max(radius, float(model.geom_size[g][0]))
     return ShankShape(radius, corner)
 
 
