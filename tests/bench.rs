@@ -85,6 +85,56 @@ fn a_case_that_takes_too_long_is_given_up() {
     assert!(out.contains("1 of 1 cases fail") && out.contains("took longer than 1 s"), "{out}");
 }
 
+/// The process that `parent` has started, from its entry in `/proc`: (id, name, state, parent, …).
+#[cfg(target_os = "linux")]
+fn child_of(parent: u32) -> Option<u32> {
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    let mut ids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    ids.find(|id| stat(*id).is_some_and(|(state, of)| of == parent && state != 'Z'))
+}
+
+/// State and parent of a process; none when it is gone.
+#[cfg(target_os = "linux")]
+fn stat(id: u32) -> Option<(char, u32)> {
+    let text = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+    let mut fields = text[text.rfind(')')? + 1..].split_whitespace();
+    Some((fields.next()?.chars().next()?, fields.next()?.parse().ok()?))
+}
+
+/// Calls again and again until there is an answer, for a minute at most.
+#[cfg(target_os = "linux")]
+fn awaited<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+    for _ in 0..1200 {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    panic!("{what} did not come about within a minute");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_case_ends_with_its_sweep() {
+    for signal in ["TERM", "KILL"] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut sweep = Command::new(cargo_bin("warpgait"))
+            .current_dir(folder.path())
+            // A map that takes seconds on any machine.
+            .args(["bench", "fig4", "--level", "hard", "--terrain", "pit", "--quiet"])
+            .spawn()
+            .unwrap();
+        let case = awaited("the process of the case", || child_of(sweep.id()));
+        let kill = format!("kill -{signal} {}", sweep.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        assert!(!sweep.wait().unwrap().success());
+        awaited("its end", || stat(case).is_none_or(|(state, _)| state == 'Z').then_some(()));
+        let left = std::fs::read_dir(folder.path().join("bench/cases")).unwrap().flatten();
+        let result = left.map(|file| file.file_name()).find(|name| name.to_string_lossy().contains("result"));
+        assert_eq!(result, None, "SIG{signal}: the case was done before it was to end");
+    }
+}
+
 #[test]
 fn the_process_of_a_case_fails_loudly() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,41 +1,16 @@
 //! Optimized phase durations: motions are solved and hold like others, their phases differ from the nominal ones and keep to
 //! their bounds, and they cost less.
 
-use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::path::Path;
-use std::sync::Arc;
+mod common;
 
+use std::path::Path;
+
+use common::solved;
 use warpgait::check::check;
-use warpgait::nlp::solve::{Motion, solve};
+use warpgait::nlp::solve::Motion;
 use warpgait::pipeline;
 use warpgait::plan::Plan;
-use warpgait::plan::sampled::Provenance;
-use warpgait::robot::Robot;
-use warpgait::scenario::{Formulation, Scenario, load_text};
-use warpgait::warp;
-
-/// Solved from scratch, sampled, written down and checked.
-fn run(text: &str) -> (Motion, Plan) {
-    let scenario: Scenario = toml::from_str(text).expect("a scenario");
-    let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
-    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
-    let field = Arc::new(ground.field.clone());
-    let map = (scenario.formulation == Formulation::Warped)
-        .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
-    let motion =
-        solve(&scenario, &robot, &field, map.as_ref(), &mut |_| ControlFlow::Continue(())).expect("a motion");
-    let provenance = Provenance {
-        scenario: &scenario,
-        text,
-        robot: &robot,
-        ground: &ground,
-        inputs: BTreeMap::new(),
-        map_seconds: 0.0,
-    };
-    let plan = Plan::from_motion(&motion, &provenance);
-    (motion, plan)
-}
+use warpgait::scenario::load_text;
 
 /// The least objective of a feasible iterate.
 fn cost(motion: &Motion) -> f64 {
@@ -56,8 +31,8 @@ fn free_switches_give_better_motions_that_hold() {
             let text = |gait: &str| {
                 format!("formulation = \"{formulation}\"\nhorizon = 4.0\n[terrain]\n{terrain}[gait]\n{gait}")
             };
-            let (fixed, _) = run(&text(""));
-            let (free, plan) = run(&text("optimize_durations = true\nduration_bounds = [0.1, 0.9]\n"));
+            let (fixed, _) = solved(&text(""));
+            let (free, plan) = solved(&text("optimize_durations = true\nduration_bounds = [0.1, 0.9]\n"));
             let name = format!("{formulation}, {}", &terrain[..16]);
             assert!(free.solved, "{name}: {}; {:?}", free.status, free.violations);
             let report = check(&plan).expect("a sound plan");
@@ -86,7 +61,7 @@ fn free_switches_give_better_motions_that_hold() {
 fn a_plan_with_switches_between_samples_is_read_back() {
     let text = "formulation = \"direct\"\nhorizon = 2.5\n[terrain]\nkind = \"rippled\"\n[start]\nposition = [0.0, 0.0]\n\
                 [goal]\nposition = [0.2, 0.1]\n[gait]\noptimize_durations = true\n[solver]\nmax_iterations = 20\ncontinuation = \"off\"\n";
-    let (_, plan) = run(text);
+    let (_, plan) = solved(text);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.plan.npz");
     plan.write(&path).expect("written");

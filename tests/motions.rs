@@ -1,36 +1,18 @@
 //! Whole motions: solved, checked by the code that reads plans alone, and as a person would expect them. Short horizons, so
 //! that all of them run in every build; their residuals are recorded in `tests/residuals.csv`.
 
+mod common;
+
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::sync::Arc;
 
+use common::solved;
 use warpgait::check::{CheckReport, check};
-use warpgait::nlp::solve::{Motion, solve};
+use warpgait::nlp::solve::Motion;
 use warpgait::plan::Plan;
-use warpgait::plan::sampled::Provenance;
-use warpgait::robot::Robot;
-use warpgait::scenario::{Formulation, Scenario};
-use warpgait::warp;
 
+/// Solved and checked.
 fn run(text: &str) -> (Motion, Plan, CheckReport) {
-    let scenario: Scenario = toml::from_str(text).expect("a scenario");
-    let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
-    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
-    let field = Arc::new(ground.field.clone());
-    let map = (scenario.formulation == Formulation::Warped)
-        .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
-    let motion =
-        solve(&scenario, &robot, &field, map.as_ref(), &mut |_| ControlFlow::Continue(())).expect("a motion");
-    let provenance = Provenance {
-        scenario: &scenario,
-        text,
-        robot: &robot,
-        ground: &ground,
-        inputs: BTreeMap::new(),
-        map_seconds: 0.0,
-    };
-    let plan = Plan::from_motion(&motion, &provenance);
+    let (motion, plan) = solved(text);
     let report = check(&plan).expect("a sound plan");
     (motion, plan, report)
 }

@@ -1,4 +1,4 @@
-//! Time that this process has spent computing.
+//! Time that a process has spent computing.
 
 use std::time::Instant;
 
@@ -53,9 +53,18 @@ impl CpuClock {
     }
 }
 
-/// utime + stime of `/proc/self/stat`.
+/// Processor time that a process has taken so far, s; none where the operating system does not tell, or it is gone.
+pub fn processor_seconds_of(process: u32) -> Option<f64> {
+    read_seconds(&format!("/proc/{process}/stat"))
+}
+
 fn processor_seconds() -> Option<f64> {
-    ticks(&std::fs::read_to_string("/proc/self/stat").ok()?).map(|ticks| ticks / TICKS)
+    read_seconds("/proc/self/stat")
+}
+
+/// utime + stime.
+fn read_seconds(stat: &str) -> Option<f64> {
+    ticks(&std::fs::read_to_string(stat).ok()?).map(|ticks| ticks / TICKS)
 }
 
 /// Fields 14 and 15. The second field, the name, may hold blanks, but ends with the last `)`.
@@ -88,5 +97,8 @@ mod tests {
             total += clock.lap();
         }
         assert!(total >= 0.02);
+        let here = processor_seconds_of(std::process::id());
+        assert!(clock.kind() == ClockKind::Wall || here.is_some_and(|seconds| seconds >= 0.02), "{here:?}");
+        assert_eq!(processor_seconds_of(u32::MAX), None);
     }
 }

@@ -3,11 +3,14 @@
 //! | module | does |
 //! | --- | --- |
 //! | [`protocol`] | which cases there are: scenarios written as text |
+//! | `ways` | where their motions start and end, and how terrains get steeper |
 //! | [`sweep`] | runs each in a process of its own, keeps finished ones |
 //! | [`case`] | what happens in that process, and what it measures |
 //! | [`clock`] | processor time |
+//! | `orphan` | no case outlives its sweep |
 //! | `tracking` | replays on the full robot, summed up |
-//! | [`summary`] | rows to groups: rates, medians, failures; CSV and JSON |
+//! | [`summary`] | rows to groups: rates, medians, failures; JSON |
+//! | [`tables`], `csv` | the groups for the terminal, the rows for spreadsheets |
 //! | [`pictures`] | drawings like the paper's |
 //!
 //! Times: `cpu_…` is processor time of the case's process (user and system, `/proc/self/stat`, steps of 10 ms), so other
@@ -15,17 +18,22 @@
 
 pub mod case;
 pub mod clock;
+mod csv;
+mod orphan;
 pub mod pictures;
 pub mod protocol;
 pub mod summary;
 pub mod sweep;
+pub mod tables;
 mod tracking;
+mod ways;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::Result;
 use crate::plan::npz::write_atomically;
+pub use orphan::end_with;
 pub use protocol::Bench;
 
 /// What to run and where to put it. Empty lists stand for what the bench does by default.
@@ -45,7 +53,7 @@ pub struct Options {
     pub formulations: Vec<String>,
     /// Kinds of terrain.
     pub terrains: Vec<String>,
-    /// Wall time that a case may take.
+    /// Processor time that the process of a case may take; so may its replay.
     pub time_limit: Duration,
     /// Take finished cases of other builds of the program, too.
     pub any_program: bool,
@@ -96,7 +104,7 @@ pub fn run(
     let groups = summary::groups(&rows);
     let mut files = vec![
         ("results.json".to_owned(), summary::json(bench, options, &rows, &groups)?),
-        ("results.csv".to_owned(), summary::csv(&rows)),
+        ("results.csv".to_owned(), csv::csv(&rows)),
     ];
     if bench == Bench::Track {
         files.push(("metrics.csv".to_owned(), tracking::metrics_csv(&rows)));

@@ -1,15 +1,14 @@
-//! From rows to rates, medians and failures; CSV, JSON and the table for the terminal.
+//! From rows to rates, medians and failures; and JSON.
 
 use serde::Serialize;
 use serde_json::json;
 
-use super::case::{Measured, MotionMeasured, Work};
+use super::case::{Measured, MotionMeasured};
 use super::protocol::{Bench, Case};
 use super::sweep::Row;
-use super::{Options, Outcome, tracking};
+use super::{Options, tracking};
 use crate::replay::{Tracked, Verdict};
 use crate::report::number;
-use crate::report::table::Table;
 use crate::{Error, Result};
 
 /// Cases that differ only in where the motion goes.
@@ -213,149 +212,6 @@ pub fn is_good(row: &Row) -> bool {
     row.outcome.as_ref().is_ok_and(Measured::is_good)
 }
 
-/// The groups as a table, and the cases that fail with their reasons.
-pub fn table(outcome: &Outcome) -> String {
-    let mut lines = match outcome.rows.iter().any(|row| row.case.work == Work::Track) {
-        true => tracking::table(&outcome.groups),
-        false => {
-            match outcome.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|m| m.motion.is_some())) {
-                true => motion_table(outcome),
-                false => map_table(&outcome.groups),
-            }
-        }
-    };
-    let failing: Vec<&Row> = outcome.rows.iter().filter(|row| !is_good(row)).collect();
-    if !failing.is_empty() {
-        lines.push(format!("\n{} of {} cases fail:", failing.len(), outcome.rows.len()));
-        lines.extend(failing.iter().map(|row| format!("  {}: {}", row.case.name, verdict(row))));
-    }
-    lines.push(String::new());
-    lines.join("\n")
-}
-
-fn motion_table(outcome: &Outcome) -> Vec<String> {
-    let mut table = Table::new(&[
-        "terrain",
-        "level",
-        "varied",
-        "formulation",
-        ">cases",
-        ">solved",
-        ">and checked",
-        ">continued",
-        ">iterations",
-        ">most",
-        ">feasible at",
-        ">solve CPU s",
-        ">most",
-        ">map CPU s",
-        ">violation",
-        ">most",
-    ]);
-    for group in &outcome.groups {
-        table.row([
-            group.terrain.clone(),
-            group.level.clone(),
-            group.parameter.map_or(String::new(), |(name, value)| format!("{name} {value}")),
-            group.method.clone(),
-            group.cases.to_string(),
-            share(group.solved, group.cases),
-            share(group.passed, group.cases),
-            group.continued.to_string(),
-            plain(group.iterations),
-            plain(group.iterations_max),
-            plain(group.first_feasible),
-            shown(group.cpu_solve),
-            shown(group.cpu_solve_max),
-            shown(group.cpu_map),
-            shown(group.violation),
-            shown(group.violation_max),
-        ]);
-    }
-    let mut lines = table.lines(|_, _, text| text);
-    lines.push("Medians, over solved cases for iterations; most: the greatest.".into());
-    lines.extend(evaluations(&outcome.rows));
-    lines
-}
-
-/// Where the time of an iteration goes, where that was measured.
-fn evaluations(rows: &[Row]) -> Vec<String> {
-    let mut table = Table::new(&[
-        "formulation",
-        ">horizon s",
-        ">variables",
-        ">constraints",
-        ">Jacobian entries",
-        ">Hessian entries",
-        ">constraints ms",
-        ">Jacobian ms",
-        ">Hessian ms",
-        ">evaluation s",
-        ">linear solver s",
-        ">total s",
-        ">iterations",
-    ]);
-    let mut any = false;
-    for row in rows {
-        let Some(motion) = row.outcome.as_ref().ok().and_then(|m| m.motion.as_ref()) else { continue };
-        let Some(evaluation) = &motion.evaluation else { continue };
-        any = true;
-        let [n, m, jacobian, hessian] = evaluation.size.map(|size| size.to_string());
-        let seconds = &motion.seconds;
-        let times = [evaluation.constraints, evaluation.jacobian, evaluation.hessian];
-        let parts = [seconds.evaluation, seconds.linear_solver, seconds.total];
-        let horizon = row.case.parameter.map_or(String::new(), |(_, value)| value.to_string());
-        let cells = [row.case.method.clone(), horizon, n, m, jacobian, hessian].into_iter();
-        let cells = cells.chain(times.map(number)).chain(parts.map(number));
-        table.row(cells.chain([motion.iterations.to_string()]));
-    }
-    match any {
-        true => std::iter::once("\nWall times, which other load on the machine lengthens:".into())
-            .chain(table.lines(|_, _, text| text))
-            .collect(),
-        false => Vec::new(),
-    }
-}
-
-fn map_table(groups: &[Group]) -> Vec<String> {
-    let mut table = Table::new(&[
-        "terrain",
-        "level",
-        "method",
-        ">CPU s",
-        ">conformal error %",
-        ">most",
-        ">misfit mm",
-        ">inversions",
-        ">energy m³",
-    ]);
-    for group in groups {
-        let method = match group.taken {
-            Some(taken) if group.method == "auto" => format!("auto: {taken}"),
-            _ => group.method.clone(),
-        };
-        let [cpu, mean, most, misfit, energy] =
-            [group.cpu_map, group.conformal_error, group.conformal_error_max, group.misfit, group.energy]
-                .map(shown);
-        let inversions = plain(group.inversions);
-        let figures = [cpu, mean, most, misfit, inversions, energy];
-        table.row([group.terrain.clone(), group.level.clone(), method].into_iter().chain(figures));
-    }
-    table.lines(|_, _, text| text)
-}
-
-pub(super) fn share(part: usize, all: usize) -> String {
-    format!("{part} ({:.0} %)", 100.0 * part as f64 / all as f64)
-}
-
-fn shown(value: Option<f64>) -> String {
-    value.map_or("–".into(), number)
-}
-
-fn plain(value: Option<f64>) -> String {
-    value.map_or("–".into(), |value| format!("{value}"))
-}
-
 /// `results.json`.
 pub(super) fn json(bench: Bench, options: &Options, rows: &[Row], groups: &[Group]) -> Result<String> {
     let cases: Vec<serde_json::Value> = rows
@@ -396,85 +252,8 @@ fn machine() -> String {
     format!("{} × {count}", model.map_or("processor of unknown model", |(_, name)| name))
 }
 
-const COLUMNS: &str = "case,robot,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
-    continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,\
-    conformal_error_most_percent,misfit_mm,inversions,energy_m3,\
-    constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,\
-    replay,replay_decided_by,replay_s,verdict";
-
-/// `results.csv`: one row a case; what does not apply stays empty.
-pub(super) fn csv(rows: &[Row]) -> String {
-    let mut text = format!("{COLUMNS}\n");
-    for row in rows {
-        text += &csv_row(row).iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",");
-        text.push('\n');
-    }
-    text
-}
-
-fn csv_row(row: &Row) -> Vec<String> {
-    let case = &row.case;
-    let measured = row.outcome.as_ref().ok();
-    let motion = measured.and_then(|m| m.motion.as_ref());
-    let map = measured.and_then(|m| m.map.as_ref());
-    let track = measured.and_then(|m| m.track.as_ref());
-    let evaluation = motion.and_then(|m| m.evaluation.as_ref());
-    vec![
-        case.name.clone(),
-        case.robot.clone(),
-        case.terrain.clone(),
-        case.level.clone(),
-        case.method.clone(),
-        cell(case.parameter.map(|(name, _)| name)),
-        cell(case.parameter.map(|(_, value)| value)),
-        cell(case.heading),
-        // A case without a result is not solved.
-        case_cell(row, motion.map(|m| m.solved)),
-        case_cell(row, motion.map(|m| m.solved && m.passed)),
-        cell(motion.map(|m| m.iterations)),
-        cell(motion.and_then(|m| m.first_feasible)),
-        cell(motion.map(|m| m.continuation)),
-        cell(motion.map(|m| m.violation)),
-        cell(motion.and(measured).map(|m| m.cpu.solve)),
-        cell(map.and(measured).map(|m| m.cpu.map)),
-        cell(map.map(|m| m.cached)),
-        cell(map.map(|m| m.report.seconds)),
-        cell(map.map(|m| 100.0 * m.report.conformal_ground.mean)),
-        cell(map.map(|m| 100.0 * m.report.conformal_ground.max)),
-        cell(map.map(|m| 1e3 * m.report.misfit_max)),
-        cell(map.map(|m| m.report.inverted_points)),
-        cell(map.map(|m| m.report.energy)),
-        cell(evaluation.map(|e| e.constraints)),
-        cell(evaluation.map(|e| e.jacobian)),
-        cell(evaluation.map(|e| e.hessian)),
-        cell(motion.map(|m| m.seconds.evaluation)),
-        cell(motion.map(|m| m.seconds.linear_solver)),
-        cell(motion.map(|m| m.seconds.total)),
-        cell(track.map(|t| t.verdict.word())),
-        cell(track.and_then(|t| Some(t.first_failing()?.name.clone()))),
-        cell(track.map(|t| t.seconds)),
-        verdict(row),
-    ]
-}
-
-pub(super) fn cell(value: Option<impl ToString>) -> String {
-    value.map_or(String::new(), |value| value.to_string())
-}
-
-fn case_cell(row: &Row, value: Option<bool>) -> String {
-    if row.outcome.is_err() { "false".into() } else { cell(value) }
-}
-
-/// A cell of RFC 4180.
-pub(super) fn quoted(cell: &str) -> String {
-    match cell.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", cell.replace('"', "\"\"")),
-        false => cell.to_owned(),
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::bench::case::Cpu;
     use crate::plan::CheckRow;
@@ -485,7 +264,8 @@ mod tests {
         Row { case, outcome: Ok(Measured { motion: Some(motion), map: None, track: None, cpu }) }
     }
 
-    fn rows() -> Vec<Row> {
+    /// Four cases: good, not good, not solved, without a result.
+    pub fn rows() -> Vec<Row> {
         let good = MotionMeasured {
             solved: true,
             passed: true,
@@ -535,17 +315,6 @@ mod tests {
         assert!(words[1].contains("friction 2.00 > 0.500 % m g LF at 1.50 s"), "{}", words[1]);
         assert!(words[2].starts_with("NOT SOLVED") && words[2].contains("reach misses by 0.300"));
         assert_eq!(words[3], "no result (signal: 9)");
-    }
-
-    #[test]
-    fn csv_has_as_many_cells_as_columns() {
-        let rows = rows();
-        assert_eq!(csv_row(&rows[3]).len(), COLUMNS.split(',').count());
-        let text = csv(&rows);
-        assert_eq!(text.lines().count(), 5);
-        assert!(text.lines().nth(3).unwrap().ends_with('"'));
-        assert!(text.lines().nth(4).unwrap().contains(",false,false,"));
-        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
     }
 
     #[test]

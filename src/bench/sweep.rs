@@ -17,6 +17,7 @@ use sha2::{Digest, Sha256};
 
 use super::Options;
 use super::case::{Measured, Work};
+use super::clock::processor_seconds_of;
 use super::protocol::Case;
 use crate::ipopt::INTERRUPT;
 use crate::plan::npz::write_atomically;
@@ -25,6 +26,8 @@ use crate::{Error, Result};
 
 /// How often a running process is looked at.
 const POLL: Duration = Duration::from_millis(10);
+/// A process that waits more than it computes is given up as well: this part of the wall time counts at least.
+const WAITING: f64 = 0.1;
 
 /// A case with what became of it.
 #[derive(Clone, Debug)]
@@ -161,10 +164,9 @@ impl Place {
 
     /// Computes a case in a process of its own.
     fn compute(&self, case: &Case, limit: Duration) -> std::result::Result<Measured, String> {
-        let start = Instant::now();
         let mut measured = self.spawn(case, limit)?;
         if let (Work::Track, Some(python), true) = (case.work, &self.python, measured.is_good()) {
-            measured.track = Some(self.replay(python, case, limit.saturating_sub(start.elapsed()))?);
+            measured.track = Some(self.replay(python, case, limit)?);
         }
         if measured.is_good() {
             // Plans are megabytes; those that are looked into are those that fail. A map has none to remove.
@@ -184,7 +186,7 @@ impl Place {
         let _ = std::fs::remove_file(&result);
         let mut command = Command::new(&self.program);
         command
-            .args(["bench-case", case.work.name()])
+            .args(["bench-case", "--parent", &std::process::id().to_string(), case.work.name()])
             .args([&scenario, &self.plan(case), &result])
             .env("WARPGAIT_CACHE", &self.maps)
             .stdout(Stdio::null());
@@ -224,7 +226,7 @@ impl Place {
     }
 }
 
-/// Runs a program to its end, at most as long as `limit`; what it says on standard error goes to `log`.
+/// Runs a program to its end, at most for `limit` of processor time, so that other load does not decide; what it says on standard error goes to `log`.
 fn wait(mut command: Command, log: &Path, limit: Duration) -> std::result::Result<ExitStatus, String> {
     let said = File::create(log).map_err(|e| format!("{}: {e}", log.display()))?;
     let mut child = command
@@ -239,13 +241,15 @@ fn wait(mut command: Command, log: &Path, limit: Duration) -> std::result::Resul
             Ok(None) => {}
             Err(error) => return Err(format!("lost sight of the process: {error}")),
         }
-        let late = start.elapsed() > limit;
+        let waited = start.elapsed().as_secs_f64();
+        let spent = processor_seconds_of(child.id()).map_or(waited, |cpu| cpu.max(WAITING * waited));
+        let late = spent > limit.as_secs_f64();
         if late || INTERRUPT.is_raised() {
             // It may have ended in between, which is as well.
             let _ = child.kill();
             let _ = child.wait();
             return Err(match late {
-                true => format!("took longer than {} s (--time-limit)", limit.as_secs()),
+                true => format!("took longer than {} s of processor time (--time-limit)", limit.as_secs()),
                 false => "interrupted".into(),
             });
         }

@@ -1,7 +1,9 @@
 //! Replays on the full robot, summed up: verdicts, what decides them, and the distribution of every metric.
 
-use super::summary::{Group, cell, quoted, share};
+use super::csv::{cell, quoted};
+use super::summary::Group;
 use super::sweep::Row;
+use super::tables::share;
 use crate::replay::Tracked;
 use crate::report::number;
 use crate::report::table::Table;

@@ -12,7 +12,7 @@ use super::console::Console;
 use super::progress::Progress;
 use crate::bench::case::{self, Work};
 use crate::bench::protocol::{FORMULATIONS, LEVELS, TERRAINS};
-use crate::bench::{self, Bench, Options, summary};
+use crate::bench::{self, Bench, Options, summary, tables};
 use crate::robot::Robot;
 use crate::{Error, Result};
 
@@ -42,7 +42,7 @@ pub(super) struct BenchArguments {
     /// Only these terrains
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(TERRAINS))]
     terrain: Vec<String>,
-    /// Wall time after which a case is given up
+    /// Processor time after which the process of a case is given up; of wall time, a tenth counts at least
     #[arg(long, value_name = "SECONDS", default_value_t = 900, value_parser = clap::value_parser!(u64).range(1..=86400))]
     time_limit: u64,
     /// Take finished cases of other builds of this program, too
@@ -53,6 +53,9 @@ pub(super) struct BenchArguments {
 /// The process of one case; what `bench` starts.
 #[derive(Debug, Args)]
 pub(super) struct CaseArguments {
+    /// Id of the process that waits for the case: when that ends, so does this one
+    #[arg(long, value_name = "PID")]
+    parent: Option<u32>,
     #[arg(value_parser = PossibleValuesParser::new(Work::ALL.map(Work::name)).try_map(work_named))]
     work: Work,
     scenario: PathBuf,
@@ -108,7 +111,7 @@ pub(super) fn bench(arguments: BenchArguments, console: &Console) -> Result<Endi
         console.note("what is finished is kept: the same command goes on from there");
         return Ok(Ending::Interrupted);
     };
-    console.result(&summary::table(&outcome));
+    console.result(&tables::table(&outcome));
     for file in &outcome.files {
         console.result(&format!("Written: {}", file.display()));
     }
@@ -121,6 +124,9 @@ pub(super) fn bench(arguments: BenchArguments, console: &Console) -> Result<Endi
 }
 
 pub(super) fn case(arguments: &CaseArguments) -> Result<Ending> {
+    if let Some(parent) = arguments.parent {
+        bench::end_with(parent)?;
+    }
     case::run_to_file(arguments.work, &arguments.scenario, &arguments.plan, &arguments.result)?;
     Ok(Ending::Good)
 }

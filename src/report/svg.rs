@@ -65,6 +65,15 @@ impl Svg {
         ));
     }
 
+    /// Many rectangles of one look as one element.
+    pub fn rects(&mut self, all: impl IntoIterator<Item = [f64; 4]>, style: &str) {
+        let mut path = String::new();
+        for [x, y, w, h] in all {
+            let _ = write!(path, "M{x:.1} {y:.1}h{w:.1}v{h:.1}h{:.1}z", -w);
+        }
+        self.element(format_args!("path d=\"{path}\" {style}"));
+    }
+
     pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: &str) {
         self.element(format_args!("circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" {style}"));
     }
@@ -106,6 +115,19 @@ impl Svg {
 
     pub fn text(&mut self, at: [f64; 2], text: &str, font: Font) {
         self.turned_text(at, text, font, 0.0);
+    }
+
+    /// A text that stays readable over what is drawn already.
+    pub fn label(&mut self, [x, y]: [f64; 2], text: &str, font: Font) {
+        let width = 0.62 * font.size * text.chars().count() as f64 + 4.0;
+        let left = match font.anchor {
+            "start" => x - 2.0,
+            "end" => x - width + 2.0,
+            _ => x - 0.5 * width,
+        };
+        let back = [left, y - 0.9 * font.size, width, 1.15 * font.size];
+        self.rect(back, "rx=\"3\" fill=\"#fff\" fill-opacity=\"0.8\"");
+        self.text([x, y], text, font);
     }
 
     /// A text turned by an angle in degrees about its anchor.

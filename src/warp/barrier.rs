@@ -66,9 +66,10 @@ pub(super) struct Curvature {
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 impl Barrier {
-    /// At J, which must not be folded.
+    /// At J, which must not be folded, with `damping` times a measure of how much M changes J in proportion, M̂_ij²/(σ_i σ_j):
+    /// that holds back the points that are about to fold and leaves the others free.
     #[inline]
-    pub fn curvature(&self, j: &[Lanes; 9]) -> Curvature {
+    pub fn curvature(&self, j: &[Lanes; 9], damping: f64) -> Curvature {
         let Singular { u, sigma, v } = Singular::of(j);
         let scale = distance::scale(self.scale, &sigma);
         let inverse = sigma.map(|s| s.map(|s| 1.0 / s.max(MIN_DET)));
@@ -76,19 +77,19 @@ impl Barrier {
             MapScale::Trace => [Lanes::splat(1.0 / 3.0); 3],
             MapScale::Determinant => inverse.map(|i| (1.0 / 3.0) * scale * i),
         };
+        let hold = BARRIER_WEIGHT + damping;
         let mut diagonal = [Lanes::ZERO; 9];
         for i in 0..3 {
             for k in 0..3 {
                 // DᵀD = 1 − 1 sᵀ − s 1ᵀ + 3 s sᵀ, with s the slopes.
                 diagonal[3 * i + k] = 3.0 * slope[i] * slope[k] - slope[i] - slope[k];
             }
-            diagonal[4 * i] += Lanes::splat(1.0) + BARRIER_WEIGHT * inverse[i] * inverse[i];
+            diagonal[4 * i] += Lanes::splat(1.0) + hold * inverse[i] * inverse[i];
         }
-        let symmetric =
-            PAIRS.map(|(i, k)| 0.5 * (Lanes::splat(1.0) + BARRIER_WEIGHT * inverse[i] * inverse[k]));
+        let symmetric = PAIRS.map(|(i, k)| 0.5 * (Lanes::splat(1.0) + hold * inverse[i] * inverse[k]));
         let skew = PAIRS.map(|(i, k)| {
             let share = Lanes::splat(1.0) - 2.0 * scale / (sigma[i] + sigma[k]).map(|s| s.max(MIN_DET));
-            0.5 * share * share
+            0.5 * (share * share + damping * inverse[i] * inverse[k])
         });
         Curvature { u, v, diagonal, symmetric, skew }
     }
@@ -155,7 +156,7 @@ mod tests {
         j[1] += 1e-5;
         for scale in [MapScale::Trace, MapScale::Determinant] {
             let density = Barrier { scale };
-            let curvature = density.curvature(&j.map(Lanes::splat));
+            let curvature = density.curvature(&j.map(Lanes::splat), 0.0);
             for i in 0..9 {
                 let gradient = |step: f64| {
                     let mut moved = j;
@@ -178,15 +179,34 @@ mod tests {
         }
     }
 
+    fn matrix(density: Barrier, j: [f64; 9], damping: f64) -> nalgebra::DMatrix<f64> {
+        let curvature = density.curvature(&j.map(Lanes::splat), damping);
+        nalgebra::DMatrix::from_fn(9, 9, |r, c| {
+            let mut unit = [Lanes::ZERO; 9];
+            unit[c] = Lanes::splat(1.0);
+            curvature.times(&unit)[r].0[2]
+        })
+    }
+
+    /// In J's own axes the measure is Σ M_ij²/(σ_i σ_j).
+    #[test]
+    fn damping_weighs_changes_in_proportion() {
+        let sigma = [1.5, 1.0, 0.1];
+        let j = [sigma[0], 0.0, 0.0, 0.0, sigma[1], 0.0, 0.0, 0.0, sigma[2]];
+        let density = Barrier { scale: MapScale::Trace };
+        let added = matrix(density, j, 0.25) - matrix(density, j, 0.0);
+        for r in 0..9 {
+            for c in 0..9 {
+                let expected = if r == c { 0.25 / (sigma[r / 3] * sigma[r % 3]) } else { 0.0 };
+                assert!((added[(r, c)] - expected).abs() < 1e-9, "{r} {c}: {} {expected}", added[(r, c)]);
+            }
+        }
+    }
+
     #[test]
     fn curvature_is_symmetric_and_nowhere_negative() {
         for scale in [MapScale::Trace, MapScale::Determinant] {
-            let curvature = Barrier { scale }.curvature(&BENT.map(Lanes::splat));
-            let matrix = nalgebra::DMatrix::from_fn(9, 9, |r, c| {
-                let mut unit = [Lanes::ZERO; 9];
-                unit[c] = Lanes::splat(1.0);
-                curvature.times(&unit)[r].0[2]
-            });
+            let matrix = matrix(Barrier { scale }, BENT, 0.0);
             assert!((&matrix - matrix.transpose()).norm() < 1e-12);
             assert!(matrix.symmetric_eigenvalues().min() > -1e-12);
         }

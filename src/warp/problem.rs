@@ -364,7 +364,7 @@ mod tests {
         let problem = Problem::new(&field, Barrier { scale: MapScale::Trace }, &map, Rule::Lobatto).unwrap();
         let mut u = moved(&problem, &map);
         problem.seat(&mut u);
-        let linearized = problem.linearized(&u, |density, jacobian| density.curvature(jacobian));
+        let linearized = problem.linearized(&u, |density, jacobian| density.curvature(jacobian, 0.0));
         let direction = |k: f64| {
             let mut v: Vec<f64> = (0..u.len()).map(|i| (k * i as f64).sin()).collect();
             problem.hold_fixed(&mut v);

@@ -1,8 +1,38 @@
-//! Hand-made plans for the tests.
+//! Motions and hand-made plans for the tests.
 #![allow(dead_code, reason = "each test crate uses its own part")]
 
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use warpgait::nlp::solve::{Motion, solve};
+use warpgait::plan::sampled::Provenance;
 use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan, Seconds};
-use warpgait::robot::Box3;
+use warpgait::robot::{Box3, Robot};
+use warpgait::scenario::{Formulation, Scenario};
+use warpgait::warp;
+
+/// Solves a scenario given as text, its map made anew, and samples the motion.
+pub fn solved(text: &str) -> (Motion, Plan) {
+    let scenario: Scenario = toml::from_str(text).expect("a scenario");
+    let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
+    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
+    let field = Arc::new(ground.field.clone());
+    let map = (scenario.formulation == Formulation::Warped)
+        .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
+    let motion =
+        solve(&scenario, &robot, &field, map.as_ref(), &mut |_| ControlFlow::Continue(())).expect("a motion");
+    let provenance = Provenance {
+        scenario: &scenario,
+        text,
+        robot: &robot,
+        ground: &ground,
+        inputs: BTreeMap::new(),
+        map_seconds: 0.0,
+    };
+    let plan = Plan::from_motion(&motion, &provenance);
+    (motion, plan)
+}
 
 /// kg
 pub const MASS: f64 = 29.5;

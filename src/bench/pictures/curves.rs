@@ -25,7 +25,7 @@ pub(super) fn histories(rows: &[&Row]) -> String {
     let longest = rows.iter().filter_map(|row| Some(motion(row)?.history.len())).max().unwrap_or(2);
     let frame = [80.0, 90.0, 650.0, 310.0];
     let axes = Axes::logarithmic(frame, [0.0, longest.saturating_sub(1).max(1) as f64], &all);
-    axes.draw(&mut svg, "dashed: the tolerance", "iteration", "units of the NLP");
+    axes.draw(&mut svg, "", "iteration", "units of the NLP");
     let floor = 10f64.powf(axes.y[0]);
     svg.clipped(frame, |svg| {
         let ends = axes.x.map(|x| axes.at(x, 1e-4));
@@ -38,9 +38,10 @@ pub(super) fn histories(rows: &[&Row]) -> String {
         }
     });
     let styles: Vec<String> = rows.iter().map(|row| style(&row.case.method, "")).collect();
-    let names: Vec<(&str, &str)> =
-        rows.iter().map(|row| row.case.method.as_str()).zip(styles.iter().map(String::as_str)).collect();
-    legend(&mut svg, [80.0, 62.0], &names);
+    let methods = rows.iter().map(|row| row.case.method.as_str()).zip(styles.iter().map(String::as_str));
+    let tolerance = format!("stroke=\"#555\" {DASHED}");
+    let names: Vec<(&str, &str)> = methods.chain([("tolerance", &*tolerance)]).collect();
+    legend(&mut svg, [80.0, 64.0], &names);
     svg.finish()
 }
 
@@ -110,8 +111,8 @@ pub(super) fn frontier(groups: &[Group]) -> String {
     heading(&mut svg, "Motions found beyond the hard level, and with fewer knots");
     let [warped, direct] = ["warped", "direct"].map(|method| style(method, ""));
     let solved = format!("stroke=\"#555\" stroke-width=\"2\" {DASHED}");
-    let names =
-        [("warped", &*warped), ("direct", &*direct), ("dashed: solved, but for the checks", &*solved)];
+    let words = "dashed: solved, but for the checks; open circles: some were given up (--time-limit)";
+    let names = [("warped", &*warped), ("direct", &*direct), (words, &*solved)];
     legend(&mut svg, [70.0, 62.0], &names);
     for (row, terrain) in terrains.into_iter().enumerate() {
         let here: Vec<&Group> = groups.iter().filter(|group| group.terrain == terrain).collect();
@@ -131,18 +132,23 @@ fn curve(svg: &mut Svg, [x, y]: [f64; 2], terrain: &str, name: &str, groups: &[&
     let frame = [x, y, 500.0, 250.0];
     let axes = Axes::new(frame, range(groups.iter().map(|group| value(group)), 0.05), [-5.0, 105.0]);
     let title = if name == "base_knots" { format!("{terrain}, medium") } else { terrain.to_string() };
-    axes.draw(svg, &title, name, "motions found, %");
+    let unit = match name {
+        "base_knots" => "distance of the base's knots, Δt",
+        "slope" => "slope",
+        _ => &format!("{name}, m"),
+    };
+    axes.draw(svg, &title, unit, "motions found, %");
     for method in distinct(groups.iter().map(|group| group.method.as_str())) {
-        let curve = |count: fn(&Group) -> usize| -> Vec<[f64; 2]> {
-            let of_method = groups.iter().filter(|group| group.method == method);
-            of_method
-                .map(|group| axes.at(value(group), 100.0 * count(group) as f64 / group.cases as f64))
-                .collect()
-        };
-        svg.polyline(curve(|group| group.solved), &style(method, DASHED));
-        let checked = curve(|group| group.passed);
-        svg.polyline(checked.iter().copied(), &style(method, ""));
-        checked.iter().for_each(|&at| svg.circle(at, 3.5, &format!("fill=\"{}\"", colour(method))));
+        let of_method: Vec<&&Group> = groups.iter().filter(|group| group.method == method).collect();
+        let at =
+            |group: &Group, count: usize| axes.at(value(group), 100.0 * count as f64 / group.cases as f64);
+        svg.polyline(of_method.iter().map(|group| at(group, group.solved)), &style(method, DASHED));
+        svg.polyline(of_method.iter().map(|group| at(group, group.passed)), &style(method, ""));
+        for group in of_method {
+            let fill = if group.without_result > 0 { "#fff" } else { colour(method) };
+            let look = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"1.5\"", colour(method));
+            svg.circle(at(group, group.passed), 4.0, &look);
+        }
     }
 }
 

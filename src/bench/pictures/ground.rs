@@ -8,6 +8,8 @@ use crate::report::svg::{Font, Svg};
 
 /// Bars of a histogram.
 const BINS: usize = 30;
+/// Colours; each is one element of the drawing.
+const SHADES: usize = 32;
 /// Height of a map's panels, with what is around them, pixels.
 const PANEL: f64 = 460.0;
 
@@ -46,14 +48,26 @@ fn from_above(svg: &mut Svg, name: &str, errors: &[[f64; 3]], top: f64) {
     let worst = most(errors);
     let side = frame[2] / (errors.len() as f64).sqrt() + 1.5;
     svg.clipped(frame, |svg| {
-        for [x, y, error] in errors {
-            let [px, py] = axes.at(*x, *y);
-            let style = format!("fill=\"{}\"", blend(1.0 - error / worst));
-            svg.rect([px - 0.5 * side, py - 0.5 * side, side, side], &style);
+        for (shade, points) in shades(errors, worst).iter().enumerate() {
+            let colour = blend(1.0 - (shade as f64 + 0.5) / SHADES as f64);
+            let rects = points.iter().map(|point| {
+                let [px, py] = axes.at(point[0], point[1]);
+                [px - 0.5 * side, py - 0.5 * side, side, side]
+            });
+            svg.rects(rects, &format!("fill=\"{colour}\""));
         }
     });
     let title = format!("{name}: blue 0, red {} %", number(100.0 * worst));
     axes.draw(svg, &title, "x, m", "y, m");
+}
+
+/// The points by their error, in equal parts of 0 … worst.
+fn shades(errors: &[[f64; 3]], worst: f64) -> [Vec<[f64; 3]>; SHADES] {
+    let mut shades = [const { Vec::new() }; SHADES];
+    for point in errors {
+        shades[((point[2] / worst * SHADES as f64) as usize).min(SHADES - 1)].push(*point);
+    }
+    shades
 }
 
 fn histogram(svg: &mut Svg, mean: f64, errors: &[[f64; 3]], top: f64) {
@@ -95,5 +109,7 @@ mod tests {
         let counts = counts([0.0, 0.5, 1.0, 1.0].into_iter(), 1.0);
         assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 1, 2));
         assert_eq!(counts.iter().sum::<usize>(), 4);
+        let shades = shades(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.3], [2.0, 0.0, 0.3]], 0.3);
+        assert_eq!((shades[0].len(), shades[SHADES - 1].len()), (1, 2));
     }
 }

@@ -33,13 +33,11 @@ impl Polar {
         [self.centre[0] + radius * sin, self.centre[1] - radius * cos]
     }
 
-    fn draw(&self, svg: &mut Svg, title: &str, unit: &str) {
+    /// What lies below the data.
+    fn grid(&self, svg: &mut Svg, title: &str) {
         let faint = "fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.15\"";
         for i in 1..=4 {
-            let share = f64::from(i) / 4.0;
-            svg.circle(self.centre, RADIUS * share, faint);
-            let [x, y] = self.at(7.5, share * self.most);
-            svg.text([x, y + 4.0], &format!("{}{unit}", share * self.most), Font::TICK);
+            svg.circle(self.centre, RADIUS * f64::from(i) / 4.0, faint);
         }
         for heading in (0..360).step_by(45) {
             let rim = self.at(heading.into(), self.most);
@@ -49,6 +47,15 @@ impl Polar {
         }
         let [x, y] = self.centre;
         svg.text([x - RADIUS, y - RADIUS - 32.0], title, Font::TITLE);
+    }
+
+    /// What lies above it: the values at the rings.
+    fn rings(&self, svg: &mut Svg, unit: &str) {
+        for i in 1..=4 {
+            let value = self.most * f64::from(i) / 4.0;
+            let [x, y] = self.at(22.5, value);
+            svg.label([x, y + 4.0], &format!("{value}{unit}"), Font::TICK);
+        }
     }
 
     fn cross(&self, svg: &mut Svg, heading: f64, value: f64) {
@@ -87,11 +94,12 @@ pub(super) fn histories(rows: &[&Row]) -> String {
     for (r, terrain) in terrains.iter().enumerate() {
         for (c, method) in methods.iter().enumerate() {
             let plot = Polar::new(c, r, most);
-            plot.draw(&mut svg, &format!("{terrain}, {method}"), "");
+            plot.grid(&mut svg, &format!("{terrain}, {method}"));
             let here = rows.iter().filter(|row| row.case.terrain == *terrain && row.case.method == *method);
             for row in here {
                 history(&mut svg, &plot, row);
             }
+            plot.rings(&mut svg, "");
         }
     }
     svg.finish()
@@ -125,7 +133,7 @@ pub(super) fn times(rows: &[&Row]) -> String {
     super::legend(&mut svg, [40.0, 62.0], &names);
     for (column, terrain) in terrains.iter().enumerate() {
         let plot = Polar::new(column, 0, most);
-        plot.draw(&mut svg, terrain, " s");
+        plot.grid(&mut svg, terrain);
         for (method, style) in &names {
             let here: Vec<&&Row> = rows
                 .iter()
@@ -140,6 +148,7 @@ pub(super) fn times(rows: &[&Row]) -> String {
                 plot.cross(&mut svg, heading(row), seconds(row).unwrap_or(most));
             }
         }
+        plot.rings(&mut svg, " s");
     }
     svg.finish()
 }
