@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-/// Exits with 0 when Python finds the package; does not import it, which would take a second.
-const HAS_PACKAGE: &str =
-    "import importlib.util, sys; sys.exit(importlib.util.find_spec('warpgait') is None)";
+/// Exits with 0 when Python finds the package; does not import it, which would take a second. Any folder called `warpgait` (a clone of the
+/// repository, seen from above) is found as a package, too, but as one without an origin.
+const HAS_PACKAGE: &str = "import importlib.util, sys; \
+     found = importlib.util.find_spec('warpgait'); sys.exit(found is None or found.origin is None)";
 
 /// A Python that has the package: of the `.venv` of the working folder, those above the program, or `python3`.
 ///
@@ -18,8 +19,8 @@ const HAS_PACKAGE: &str =
 pub fn python() -> Result<PathBuf> {
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
         Error::input(
-            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it: \
-             python3 -m venv .venv && .venv/bin/pip install ./validate",
+            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it, in the \
+             folder of the repository: scripts/setup --python; or into an environment of yours: pip install ./validate",
         )
     })
 }

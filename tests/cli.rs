@@ -156,6 +156,34 @@ fn validate_hands_over_to_python() {
     assert_eq!((code, out.trim()), (1, "-m warpgait.validate a.plan.npz --friction 0.5"));
     let (_, out, _) = warpgait(folder.path(), &["--json", "validate", "a.plan.npz"]);
     assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
+
+    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
+    assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
+
+    // A Python that crashes is neither "not trackable" nor an interruption.
+    std::fs::write(bin.join("python"), "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\nkill -s SEGV $$\n").unwrap();
+    let (code, _, err) = warpgait(folder.path(), &["validate", "a.plan.npz"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("crashed"), "{err}");
+    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
+    assert!(out.contains("\"error\""), "{out}");
+}
+
+/// A clone of the repository is a folder called `warpgait`: seen from above, Python takes it for a package.
+#[cfg(unix)]
+#[test]
+fn a_folder_of_the_same_name_is_not_the_python_package() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let bin = folder.path().join(".venv/bin");
+    std::fs::create_dir_all(&bin).unwrap();
+    std::fs::create_dir(folder.path().join("warpgait")).unwrap();
+    // The system's Python, which asks for the package as ours does, without the one of the repository's environment.
+    let script = "#!/bin/sh\n[ \"$1\" = -c ] && exec python3 \"$@\"\necho chosen\n";
+    std::fs::write(bin.join("python"), script).unwrap();
+    std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
+    let (_, out, _) = warpgait(folder.path(), &["validate", "none.plan.npz", "--no-files"]);
+    assert!(!out.contains("chosen"), "{out}");
 }
 
 const FLAT: &str = "\

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use warpgait::constraints::Constraint;
 use warpgait::ipopt::NlpProblem;
 use warpgait::nlp::derivatives;
 use warpgait::nlp::problem::{Choice, Problem};
@@ -121,11 +122,15 @@ fn durations_match_differences_wherever_the_switches_are() {
         let law = format!("{gait}\n[physics]\nlaw = \"pcdm-backward\"\n[contact]\ncone = \"conformal\"");
         check(problem(TERRAINS[1].1, formulation, &law), "pcdm-backward, conformal");
     }
-    // With known legs: their speeds and torques follow the switches too. (On other terrains a knee may lie within a step of the
-    // differences of a knot of the ground, where its third derivative jumps.)
+    // With known legs: their speeds and torques follow the switches too.
     for formulation in ["warped", "direct"] {
         for robot in ["anymal_b", "anymal_c"] {
-            check(problem_of(robot, TERRAINS[4].1, formulation, gait), formulation);
+            for (name, terrain) in TERRAINS {
+                check(
+                    problem_of(robot, terrain, formulation, gait),
+                    &format!("{robot}, {name}, {formulation}"),
+                );
+            }
         }
     }
     // The switches themselves, all of them, and samples that are in another phase than at the guess.
@@ -177,22 +182,22 @@ fn coarse_knots_and_newton_euler_match_differences() {
 
 /// Of a robot with known legs: joint speeds, torques and clearance of the knees besides.
 #[test]
-fn blocks_of_known_legs_match_differences() {
+fn blocks_of_known_legs_match_differences_on_all_terrains() {
     for formulation in ["warped", "direct"] {
         for robot in ["anymal_b", "anymal_c"] {
-            let problem = problem_of(robot, TERRAINS[0].1, formulation, "");
-            for name in ["joint speed", "joint torque", "knee clearance"] {
-                assert!(
-                    problem.blocks().any(|(block, _)| block.name() == name && block.rows() > 0),
-                    "{name}"
-                );
+            for (terrain, text) in TERRAINS {
+                let problem = problem_of(robot, text, formulation, "");
+                for name in ["joint speed", "joint torque", "knee clearance"] {
+                    let has = |(block, _): (&dyn Constraint, usize)| block.name() == name && block.rows() > 0;
+                    assert!(problem.blocks().any(has), "{name}");
+                }
+                check(problem, &format!("{robot}, {terrain}, {formulation}"));
             }
-            check(problem, robot);
         }
     }
 }
 
-/// The check itself must see a wrong derivative: one entry of the Jacobian off by 1e-3.
+/// The check itself must see a wrong derivative: one entry of the Jacobian, or of the Hessian, off by a hundred thousandth.
 #[test]
 fn the_check_is_not_blind() {
     let mut problem = problem(TERRAINS[0].1, "warped", "");
@@ -201,6 +206,9 @@ fn the_check_is_not_blind() {
         initial(&problem).iter().enumerate().map(|(i, x)| x + 0.01 * (i as f64).sin()).collect();
     let all: Vec<usize> = (0..x.len()).collect();
     assert!(derivatives::check(&mut problem, &x, &all).iter().all(|e| e.largest < TOLERANCE));
-    let wrong = derivatives::check_with(&mut problem, &x, &all, |values| values[17] += 1e-3);
-    assert!(wrong.iter().any(|e| e.largest > TOLERANCE));
+    let tamper = |values: &mut [f64]| values[17] += 1e-5 * values[17].abs().max(1.0);
+    let wrong = derivatives::check_with(&mut problem, &x, &all, tamper, |_| {});
+    assert!(wrong.iter().any(|e| e.largest > TOLERANCE && e.block != "hessian"));
+    let wrong = derivatives::check_with(&mut problem, &x, &all, |_| {}, tamper);
+    assert!(wrong.iter().all(|e| (e.largest > TOLERANCE) == (e.block == "hessian")));
 }

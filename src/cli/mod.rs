@@ -86,6 +86,13 @@ enum Command {
     },
 }
 
+impl Command {
+    /// Whether `--json` stands among the words that are handed over to Python.
+    fn asks_for_json(&self) -> bool {
+        matches!(self, Command::Validate { arguments } if arguments.iter().any(|word| word == "--json"))
+    }
+}
+
 /// Runs the program with the arguments it was started with.
 pub fn run() -> ExitCode {
     let arguments = match Arguments::try_parse() {
@@ -96,7 +103,7 @@ pub fn run() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let console = Console::new(arguments.json, arguments.quiet);
+    let console = Console::new(arguments.json || arguments.command.asks_for_json(), arguments.quiet);
     match execute(arguments.command, &console) {
         Ok(Ending::Good) => ExitCode::SUCCESS,
         Ok(Ending::NotGood) => ExitCode::from(1),

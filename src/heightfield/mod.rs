@@ -212,6 +212,14 @@ impl Heightfield {
         [dot(&wx.weights[1], &c), dot(&wx.weights[0], &c_y)]
     }
 
+    /// h and (∂h/∂x, ∂h/∂y): both for little more than one.
+    #[inline]
+    pub fn height_and_gradient(&self, x: f64, y: f64) -> (f64, [f64; 2]) {
+        let (wx, wy) = (self.axes[0].weights::<2>(x), self.axes[1].weights::<2>(y));
+        let [c, c_y] = self.contract(&wx, &wy);
+        (dot(&wx.weights[0], &c), [dot(&wx.weights[1], &c), dot(&wx.weights[0], &c_y)])
+    }
+
     /// h and its derivatives up to the third order.
     #[inline]
     pub fn jet(&self, x: f64, y: f64) -> HeightJet {

@@ -15,59 +15,9 @@ use std::ops::Range;
 
 use super::gait::{Gait, Stance, Swing};
 use super::instant::Instant;
+use super::node::LinearNode;
 use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
 use super::switches::{self, TimedNode};
-
-/// A sampled quantity: component d is the sum of `weight * x[variable + d]` over the terms.
-///
-/// Where the weights depend on switches, `times` holds what the node's differential has besides the terms.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LinearNode {
-    /// (first variable, weight).
-    pub terms: Vec<(usize, f64)>,
-    /// (switch, derivative of each of the three components with respect to it).
-    pub times: Vec<(usize, [f64; 3])>,
-}
-
-impl LinearNode {
-    /// A node that is a variable itself.
-    pub fn variable(variable: usize) -> Self {
-        Self { terms: vec![(variable, 1.0)], times: Vec::new() }
-    }
-
-    /// Its first variable; of a node that is a variable itself, that variable.
-    pub fn first(&self) -> usize {
-        self.terms[0].0
-    }
-
-    /// Its value at x.
-    pub fn value<const D: usize>(&self, x: &[f64]) -> [f64; D] {
-        let mut y = [0.0; D];
-        for &(variable, weight) in &self.terms {
-            for d in 0..D {
-                y[d] += weight * x[variable + d];
-            }
-        }
-        y
-    }
-
-    /// The differential of component d: (variable, coefficient).
-    pub fn differential(&self, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let terms = self.terms.iter().map(move |&(variable, weight)| (variable + d, weight));
-        terms.chain(self.times.iter().map(move |&(variable, by)| (variable, by[d])))
-    }
-
-    /// Adds a variable's share.
-    pub fn push(&mut self, variable: usize, weight: f64) {
-        if weight.abs() < 1e-15 {
-            return;
-        }
-        match self.terms.iter_mut().find(|(v, _)| *v == variable) {
-            Some(term) => term.1 += weight,
-            None => self.terms.push((variable, weight)),
-        }
-    }
-}
 
 /// Distance of the knots, in samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

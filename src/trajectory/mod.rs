@@ -6,6 +6,7 @@
 pub mod gait;
 pub mod instant;
 pub mod layout;
+pub mod node;
 pub mod rotation;
 pub mod sampling;
 pub mod space;
@@ -14,4 +15,5 @@ pub mod switches;
 
 pub use gait::{Gait, Stance, Swing};
 pub use instant::Instant;
-pub use layout::{Layout, LinearNode};
+pub use layout::Layout;
+pub use node::LinearNode;

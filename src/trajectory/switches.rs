@@ -16,7 +16,7 @@
 //! does f̄.
 
 use super::gait::Swing;
-use super::layout::LinearNode;
+use super::node::LinearNode;
 use super::spline::SwingBasis;
 
 /// No switch moves further than this from its nominal time, s.

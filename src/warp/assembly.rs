@@ -272,7 +272,7 @@ fn row(
 }
 
 /// Along y: J at the points of one block of a row.
-#[inline]
+#[inline(always)]
 fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [Lanes; 9] {
     let width = PLANE_KINDS * blocks;
     let sources: [&Row; 4] = std::array::from_fn(|k| &plane[(s.first + k) * width..][..width]);

@@ -6,7 +6,8 @@
 use std::ops::ControlFlow;
 
 use super::barrier::{Barrier, Curvature};
-use super::lbfgs::{Limits, Objective, Outcome, dot};
+use super::lbfgs::{Limits, Objective, Outcome, add, dot};
+use super::line_search::backtrack;
 use super::problem::Problem;
 
 /// Where it settles it does so within two dozen, and each is dear.
@@ -18,8 +19,6 @@ const MAX_INNER: usize = 40;
 /// one point on the way to its fold keeps back all.)
 const DAMPING: [f64; 2] = [0.01, 10.0];
 const DAMPING_FACTOR: f64 = 4.0;
-const SUFFICIENT_DECREASE: f64 = 1e-4;
-const MAX_BACKTRACKS: usize = 30;
 
 /// Minimizes from u, which must not be folded. `progress` sees the iteration, the energy and gᵀd, d the step.
 pub(super) fn gauss_newton(
@@ -59,30 +58,25 @@ pub(super) fn gauss_newton(
         if outcome.iterations >= limits.iterations.min(MAX_ITERATIONS) {
             return outcome;
         }
-        let mut scale = 1.0;
-        let mut accepted = None;
-        for _ in 0..MAX_BACKTRACKS {
-            for ((t, u), d) in trial.iter_mut().zip(u.iter()).zip(&step) {
-                *t = u - scale * d;
-            }
-            let next = problem.evaluate(&mut trial, &mut trial_gradient);
-            outcome.evaluations += 1;
-            // An infinite value, that is, a fold, fails this.
-            if next <= value - SUFFICIENT_DECREASE * scale * decrement {
-                accepted = Some(next);
-                break;
-            }
-            scale *= 0.5;
-        }
-        let Some(next) = accepted else { return outcome };
-        damping = match scale < 1.0 {
+        let accepted = backtrack(
+            problem,
+            u,
+            value,
+            &step,
+            decrement,
+            &mut trial,
+            &mut trial_gradient,
+            &mut outcome.evaluations,
+        );
+        let Some(accepted) = accepted else { return outcome };
+        damping = match accepted.scale < 1.0 {
             true => (DAMPING_FACTOR * damping).clamp(DAMPING[0], DAMPING[1]),
             false if damping > DAMPING[0] => damping / DAMPING_FACTOR,
             false => 0.0,
         };
         std::mem::swap(u, &mut trial);
         std::mem::swap(&mut gradient, &mut trial_gradient);
-        value = next;
+        value = accepted.value;
         outcome.iterations += 1;
     }
 }
@@ -124,10 +118,3 @@ fn newton_step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64], 
 
 /// The residual of a linear system, in the preconditioner's norm, relative to the gradient.
 const FORCING: f64 = 0.1;
-
-/// a += factor · b.
-fn add(a: &mut [f64], factor: f64, b: &[f64]) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a += factor * b;
-    }
-}

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
+use super::line_search::backtrack;
+
 /// What is to be minimized. Vectors are coefficients in full; those that are fixed have gradient and direction zero.
 pub(super) trait Objective {
     /// The value at x and its gradient; infinite where x is not allowed. Coefficients that depend on others are set first.
@@ -33,10 +35,9 @@ pub(super) struct Outcome {
     pub decrement: f64,
 }
 
-/// Pairs (step, change of gradient) that are remembered.
-const MEMORY: usize = 12;
-const SUFFICIENT_DECREASE: f64 = 1e-4;
-const MAX_BACKTRACKS: usize = 30;
+/// Pairs (step, change of gradient) that are remembered. With 12 the benchmark's medium pit takes 38 iterations on its finest grid and
+/// the hard one 82, with 20 they take 27 and 67; more are no better.
+const MEMORY: usize = 20;
 
 struct Pair {
     step: Vec<f64>,
@@ -86,22 +87,17 @@ pub(super) fn minimize(
         if outcome.iterations >= limits.iterations {
             return outcome;
         }
-        // Armijo's rule; an infinite value fails it.
-        let mut scale = 1.0;
-        let mut accepted = None;
-        for _ in 0..MAX_BACKTRACKS {
-            for ((t, x), d) in trial.iter_mut().zip(x.iter()).zip(&direction) {
-                *t = x - scale * d;
-            }
-            let next = objective.evaluate(&mut trial, &mut trial_gradient);
-            outcome.evaluations += 1;
-            if next <= value - SUFFICIENT_DECREASE * scale * decrement {
-                accepted = Some(next);
-                break;
-            }
-            scale *= if next.is_finite() { 0.5 } else { 0.3 };
-        }
-        let Some(next) = accepted else {
+        let accepted = backtrack(
+            objective,
+            x,
+            value,
+            &direction,
+            decrement,
+            &mut trial,
+            &mut trial_gradient,
+            &mut outcome.evaluations,
+        );
+        let Some(accepted) = accepted else {
             if pairs.is_empty() {
                 return outcome;
             }
@@ -115,7 +111,7 @@ pub(super) fn minimize(
             rho: 0.0,
         });
         for (s, d) in pair.step.iter_mut().zip(&direction) {
-            *s = -scale * d;
+            *s = -accepted.scale * d;
         }
         for ((y, new), old) in pair.change.iter_mut().zip(&trial_gradient).zip(&gradient) {
             *y = new - old;
@@ -133,7 +129,7 @@ pub(super) fn minimize(
         }
         std::mem::swap(x, &mut trial);
         std::mem::swap(&mut gradient, &mut trial_gradient);
-        value = next;
+        value = accepted.value;
         outcome.iterations += 1;
     }
 }
@@ -176,7 +172,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// a += factor · b.
-fn add(a: &mut [f64], factor: f64, b: &[f64]) {
+pub(super) fn add(a: &mut [f64], factor: f64, b: &[f64]) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += factor * b;
     }

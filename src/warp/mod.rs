@@ -13,6 +13,7 @@ mod gauss_newton;
 mod inverse;
 mod lanes;
 mod lbfgs;
+mod line_search;
 mod local_global;
 mod preconditioner;
 mod problem;

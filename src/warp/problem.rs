@@ -141,10 +141,9 @@ impl<'a, D: Density> Problem<'a, D> {
 
     /// The Gauss–Newton matrix at u, to be applied by [`Problem::curved`].
     pub fn linearized<C>(&self, u: &[f64], curvature: impl Fn(&D, &[Lanes; 9]) -> C) -> Linearized<C> {
-        let Ground { x, y, .. } = self.ground(u);
         Linearized {
             curvatures: self.assembly.curvatures(u, |jacobian| curvature(&self.density, jacobian)),
-            slopes: x.iter().zip(&y).map(|(x, y)| self.field.gradient(*x, *y)).collect(),
+            slopes: self.ground(u).slopes,
         }
     }
 
@@ -221,7 +220,8 @@ impl<'a, D: Density> Problem<'a, D> {
     /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
     fn ground(&self, u: &[f64]) -> Ground {
         let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let heights: Vec<f64> = x.iter().zip(&y).map(|(x, y)| self.field.height(*x, *y)).collect();
+        let (heights, slopes): (Vec<f64>, _) =
+            x.iter().zip(&y).map(|(x, y)| self.field.height_and_gradient(*x, *y)).unzip();
         let mut face = self.bottom.project(&heights);
         let mut misfit = self.bottom.values(&face);
         for (m, h) in misfit.iter_mut().zip(&heights) {
@@ -230,7 +230,7 @@ impl<'a, D: Density> Problem<'a, D> {
         for (f, lowered) in face.iter_mut().zip(&self.lowered) {
             *f -= lowered;
         }
-        Ground { x, y, face, misfit }
+        Ground { slopes, face, misfit }
     }
 }
 
@@ -244,9 +244,8 @@ pub(super) struct Linearized<C> {
 
 /// The bottom face and the terrain under it.
 struct Ground {
-    /// φ₀ and φ₁ at the Gauss points, m.
-    x: Vec<f64>,
-    y: Vec<f64>,
+    /// ∇h(φ₀, φ₁) at the Gauss points.
+    slopes: Vec<[f64; 2]>,
     /// The bottom-face coefficients that φ₂ must have.
     face: Vec<f64>,
     /// What the projection leaves: φ₂ − h(φ₀, φ₁) at the Gauss points, m.
@@ -255,13 +254,12 @@ struct Ground {
 
 impl<D: Density> Objective for Problem<'_, D> {
     fn evaluate(&mut self, u: &mut [f64], gradient: &mut [f64]) -> f64 {
-        let Ground { x, y, face, misfit } = self.ground(u);
+        let Ground { slopes, face, misfit } = self.ground(u);
         self.set_face(u, &face);
         let energy = self.assembly.energy(self.density, u, gradient);
         if !energy.is_finite() {
             return energy;
         }
-        let slopes: Vec<[f64; 2]> = x.iter().zip(&y).map(|(x, y)| self.field.gradient(*x, *y)).collect();
         let weighted = self.bottom.weighted(&misfit);
         self.pass_on(&slopes, &weighted, gradient);
         energy + self.misfit_weight * dot(&weighted, &misfit)

@@ -12,6 +12,12 @@ use warpgait::scenario;
 use crate::error::{InputError, exception};
 use crate::trajectory::Trajectory;
 
+/// Plan the motion of a scenario and check it, as `warpgait solve` does.
+///
+/// `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
+/// `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
+/// iteration of the nonlinear program; what it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile;
+/// of several solves in one process, one runs at a time. A solve that does not converge is no error: see `solved` and `passed`.
 #[pyfunction]
 #[pyo3(signature = (scenario, *, overrides = None, progress = None))]
 pub fn solve(

@@ -9,6 +9,7 @@ use warpgait::heightfield::Heightfield;
 use crate::arrays::{Numbers, array, values};
 use crate::error::InputError;
 
+/// The ground as planned on: a C² spline through the heights of the plan; beyond their rectangle it is extended.
 #[pyclass(frozen, module = "warpgait")]
 pub struct Terrain(pub Arc<Heightfield>);
 
@@ -39,19 +40,23 @@ impl Terrain {
 
 #[pymethods]
 impl Terrain {
+    /// x_min, x_max, y_min, y_max, m.
     #[getter]
     fn extent(&self) -> (f64, f64, f64, f64) {
         self.0.extent().into()
     }
 
+    /// h, m, (…), at points (…, 2), x and y in m.
     fn height(&self, py: Python<'_>, points: Numbers) -> PyResult<Py<PyArrayDyn<f64>>> {
         self.at(py, &points, &[], |field, x, y| [field.height(x, y)])
     }
 
+    /// ∂h/∂x and ∂h/∂y, (…, 2), at points (…, 2).
     fn gradient(&self, py: Python<'_>, points: Numbers) -> PyResult<Py<PyArrayDyn<f64>>> {
         self.at(py, &points, &[2], |field, x, y| field.gradient(x, y))
     }
 
+    /// The upward unit normal, (…, 3), at points (…, 2).
     fn normal(&self, py: Python<'_>, points: Numbers) -> PyResult<Py<PyArrayDyn<f64>>> {
         self.at(py, &points, &[3], |field, x, y| field.normal(x, y))
     }

@@ -16,26 +16,41 @@ use crate::arrays::{Numbers, array, values};
 use crate::error::exception;
 use crate::terrain::Terrain;
 
+/// The base at times of shape (…), in the world frame.
 #[pyclass(frozen, get_all, module = "warpgait")]
 pub struct BaseMotion {
+    /// (…, 3) centre of mass, m.
     position: Py<PyArrayDyn<f64>>,
+    /// (…, 4) body to world, unit, with the sign of the plan's samples nearby.
     quaternion_wxyz: Py<PyArrayDyn<f64>>,
+    /// (…, 3) m/s.
     linear_velocity: Py<PyArrayDyn<f64>>,
+    /// (…, 3) m/s².
     linear_acceleration: Py<PyArrayDyn<f64>>,
+    /// (…, 3) rad/s, world.
     angular_velocity: Py<PyArrayDyn<f64>>,
+    /// (…, 3) rad/s², world.
     angular_acceleration: Py<PyArrayDyn<f64>>,
 }
 
+/// All feet at times of shape (…), in the world frame, in the order of `Trajectory.foot_names`.
 #[pyclass(frozen, get_all, module = "warpgait")]
 pub struct FeetMotion {
+    /// (…, E, 3) contact points, m.
     position: Py<PyArrayDyn<f64>>,
+    /// (…, E, 3) m/s.
     velocity: Py<PyArrayDyn<f64>>,
+    /// (…, E, 3) m/s².
     acceleration: Py<PyArrayDyn<f64>>,
+    /// (…, E, 3) of the ground on the robot, N.
     force: Py<PyArrayDyn<f64>>,
+    /// (…, E) in stance; a foot that lifts off or touches down at this very time counts as standing.
     contact: Py<PyArrayDyn<bool>>,
+    /// (…, E, 3) unit normal of the terrain under the foot.
     normal: Py<PyArrayDyn<f64>>,
 }
 
+/// A plan as the splines that were optimised: exact at any time, not interpolated between samples.
 #[pyclass(frozen, module = "warpgait")]
 pub struct Trajectory {
     plan: Plan,
@@ -59,36 +74,43 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
+    /// The horizon, s.
     #[getter]
     fn duration(&self) -> f64 {
         self.motion.duration()
     }
 
+    /// (N,) times of the plan's own samples, s.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.plan.t)
     }
 
+    /// The E feet in order.
     #[getter]
     fn foot_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.plan.foot_names)
     }
 
+    /// The ground as planned on.
     #[getter]
     fn terrain(&self) -> Terrain {
         Terrain(self.ground.clone())
     }
 
+    /// Every constraint of the nonlinear program holds.
     #[getter]
     fn solved(&self) -> bool {
         self.plan.meta.solver.success
     }
 
+    /// Every check in the plan holds: each law again, from the samples alone.
     #[getter]
     fn passed(&self) -> bool {
         self.plan.meta.checks.iter().all(|row| row.passed)
     }
 
+    /// The plan's member `meta`: scenario, robot, solver, checks, inputs.
     #[getter]
     fn meta<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text =
@@ -96,6 +118,7 @@ impl Trajectory {
         py.import("json")?.call_method1("loads", (text,))
     }
 
+    /// The base at times t in s, of any shape (…); a time outside 0…`duration` is refused.
     fn base(&self, py: Python<'_>, t: Numbers) -> PyResult<BaseMotion> {
         let (shape, times) = values(&t);
         let found = py
@@ -116,6 +139,7 @@ impl Trajectory {
         })
     }
 
+    /// The feet and their forces at times t in s, of any shape (…).
     fn feet(&self, py: Python<'_>, t: Numbers) -> PyResult<FeetMotion> {
         let (shape, times) = values(&t);
         let feet = self.motion.feet();
@@ -139,6 +163,7 @@ impl Trajectory {
         })
     }
 
+    /// Write the plan file, `NAME.plan.npz`.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.plan.write(&path)).map_err(exception)
     }
@@ -150,6 +175,7 @@ impl Trajectory {
     }
 }
 
+/// Read a plan file; one that is damaged or has no splines is refused with file, member and reason.
 #[pyfunction]
 pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Trajectory> {
     let named = |error| match error {

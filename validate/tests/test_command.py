@@ -1,6 +1,7 @@
 """The command: files, exit codes, messages."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -44,8 +45,9 @@ def test_a_bad_plan_gives_exit_code_1_and_the_reason(
 def test_errors_give_exit_code_2_and_a_report_that_says_so(
     standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([str(tmp_path / "none.plan.npz")]) == 2
-    assert "no such file" in capsys.readouterr().err
+    assert main([str(tmp_path / "none.plan.npz"), "--json"]) == 2
+    said = capsys.readouterr()
+    assert "no such file" in said.err and "no such file" in json.loads(said.out)["error"]
 
     def rename(a: dict[str, Any]) -> None:
         meta = json.loads(str(a["meta"]))
@@ -55,11 +57,40 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     other = crawl.altered(standing_plan, tmp_path / "towr.plan.npz", rename)
     assert main([str(other)]) == 2
     assert "no full model" in capsys.readouterr().err
+    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file
+    assert "no folder for the reports" in capsys.readouterr().err
     assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
-    assert main([str(standing_plan), "--friction", "-1"]) == 2
-    assert main([str(standing_plan), "--rate", "333"]) == 2
-    assert main([str(standing_plan), "--push", "0,nan,0,0,0"]) == 2
+    before = sorted(standing_plan.parent.iterdir())
+    for wrong in (
+        ["--friction", "-1"],
+        ["--rate", "333"],
+        ["--rate", "0"],
+        ["--push", "0,nan,0,0,0"],
+        ["--push", "0,-1,0,0,0"],
+        ["--seed", "-1"],
+    ):
+        assert main([str(standing_plan), *wrong]) == 2
+        assert wrong[0] in capsys.readouterr().err
+    assert sorted(standing_plan.parent.iterdir()) == before  # a report of an earlier run stays
+
+
+def test_an_error_of_the_program_is_no_verdict(
+    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("warpgait.validation.analyse", lambda *_: 1 / 0)
+    assert main([str(standing_plan), "-o", str(tmp_path)]) == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_output_that_nobody_reads_leaves_the_verdict_alone(standing_plan: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-pictures"]
+    run = subprocess.Popen([*command, "--no-second-opinion"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert run.stdout is not None and run.stderr is not None
+    run.stdout.close()
+    assert run.wait() == 0, run.stderr.read()
+    run.stderr.close()
+    assert json.loads((tmp_path / "stand.report.json").read_text())["verdict"] == "pass"
 
 
 def test_without_a_display_or_opengl_the_report_says_what_to_install(
@@ -69,6 +100,15 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
     assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]) == 0
     assert "libegl1" in capsys.readouterr().err
     assert "libegl1" in (tmp_path / "stand.report.html").read_text()
+
+
+def test_an_opengl_that_is_missing_costs_the_pictures_only(standing_plan: Path, tmp_path: Path) -> None:
+    """MuJoCo itself cannot be imported with such a setting."""
+    command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]
+    environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "No pictures" in done.stderr and "libosmesa6" in done.stderr
 
 
 def test_without_ffmpeg_a_film_is_refused_kindly(

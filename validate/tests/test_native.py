@@ -1,5 +1,7 @@
 """The native side: plans evaluated exactly, terrain, and solving with progress, Ctrl-C and clear refusals."""
 
+import ast
+import inspect
 import os
 import signal
 import threading
@@ -12,6 +14,7 @@ import pytest
 
 import warpgait
 from crawl import altered
+from warpgait import _native
 from warpgait.plan import load as load_samples
 
 # A short trot over ripples; a few iterations make a motion with everything in it, though not a solved one.
@@ -225,3 +228,21 @@ def test_other_threads_run_during_a_solve() -> None:
     thread.join()
     # Were the lock held, the thread would have slept through the solve.
     assert max(spans) < 0.5 * (time.perf_counter() - started)
+
+
+def test_help_says_what_editors_say() -> None:
+    """The stub file and the compiled documentation are the same, for everything there is."""
+    stub = ast.parse((Path(warpgait.__file__).parent / "_native.pyi").read_text(encoding="utf-8"))
+    compared = 0
+    for item in stub.body:
+        if not isinstance(item, ast.ClassDef | ast.FunctionDef):
+            continue
+        found = getattr(_native, item.name)
+        assert inspect.getdoc(found) == ast.get_docstring(item), item.name
+        members = [m for m in item.body if isinstance(m, ast.FunctionDef)] if isinstance(item, ast.ClassDef) else []
+        for member in members:
+            assert inspect.getdoc(getattr(found, member.name)) == ast.get_docstring(member), f"{item.name}.{member.name}"
+        if isinstance(item, ast.ClassDef):
+            assert {m.name for m in members} == {name for name in dir(found) if not name.startswith("_")}
+        compared += 1 + len(members)
+    assert compared > 25

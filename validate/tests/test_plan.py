@@ -66,16 +66,18 @@ def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: 
 
 def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) -> None:
     whole = standing_plan.read_bytes()
-    for name, content in (
-        ("half", whole[: len(whole) // 2]),
-        ("empty", b""),
-        ("text", b"hello"),
-        ("rot", whole[:2000] + b"x" * 500 + whole[2500:]),
+    for name, content, words in (
+        ("half", whole[: len(whole) // 2], "cut short"),
+        ("empty", b"", "an empty file"),
+        ("text", b"hello", "not an .npz archive; a plan is a"),
+        ("rot", whole[:2000] + b"x" * 500 + whole[2500:], "damaged"),
     ):
         path = tmp_path / f"{name}.plan.npz"
         path.write_bytes(content)
-        with pytest.raises(InputError, match=name):
+        with pytest.raises(InputError, match=f"{name}.*{words}"):
             load(path)
+    with pytest.raises(InputError, match="a folder"):
+        load(tmp_path)
     with pytest.raises(InputError, match="no such file"):
         load(tmp_path / "missing.plan.npz")
     np.save(tmp_path / "array.npy", np.zeros(3))

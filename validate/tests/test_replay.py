@@ -70,6 +70,33 @@ def test_adhesive_feet_hold_on_a_slope_where_others_slide(steep_plan: Path, tmp_
     assert validate(load(plain), Settings(second_opinion=False)).verdict is Verdict.FAIL
 
 
+@pytest.fixture(scope="module")
+def wall_plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four steps up 50°, all feet adhesive."""
+    path = tmp_path_factory.mktemp("plans") / "wall.plan.npz"
+    feet, angle = ("LF", "RF", "LH", "RH"), 50.0
+    box = (-1.0, 1.0, -1.0, 1.0)
+    return crawl.make(path, height=crawl.slope(angle), steps=4, stride=0.06, tilt=np.deg2rad(angle), adhesive=feet, extent=box)
+
+
+def test_a_foot_that_is_to_pull_finds_a_wall_3_mm_deeper_than_planned(wall_plan: Path) -> None:
+    """Until it touches, its pull must not be counted on: that would throw the leg, away from the wall."""
+    plan = load(wall_plan)
+    pull = (plan.foot_force[:, 0] * plan.foot_normal[:, 0]).sum(-1)
+    assert pull.min() < -100.0  # N, of LF, which steps last
+    ground, hold = plan.terrain, plan.foot_position[-1, 0]
+    rows, columns = ground.heights.shape
+    x = ground.origin[0] + ground.spacing[0] * np.arange(columns) - hold[0]
+    y = ground.origin[1] + ground.spacing[1] * np.arange(rows) - hold[1]
+    dent = 0.003 / plan.foot_normal[-1, 0, 2] * np.exp(-(x**2 + y[:, None] ** 2) / 0.08**2)
+    dented = Heightfield(ground.heights - dent, ground.origin, ground.spacing)
+    found = validate(replace(plan, terrain=dented), Settings(second_opinion=False))
+    assert found.trials[0].incidents == []
+    assert found.trials[0].verdict is not Verdict.FAIL
+    end = found.trials[0].replay.force[-100:, 0].mean(0) @ plan.foot_normal[-1, 0]
+    assert end == pytest.approx(pull[-1], abs=0.05 * plan.weight)  # and it does pull in the end
+
+
 def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan: Path) -> None:
     push = (0.4, 0.5, 0.0, 900.0, 0.0)
     found = validate(load(standing_plan), Settings(second_opinion=False, disturbance=Disturbance(push=push)))
@@ -98,3 +125,19 @@ def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
     assert [t.name for t in found.trials] == ["closed loop", "closed loop, raw terrain"]
     assert found.trials[0].verdict is Verdict.PASS
     assert found.verdict is not Verdict.PASS
+    assert found.shown is found.trials[1]  # pictures and plots are of what went wrong
+
+
+def test_a_foot_steps_over_an_edge_that_the_plan_does_not_know(tmp_path: Path) -> None:
+    """7 cm high, 5 cm before the foot; a foot that only follows its path stays 15 cm behind."""
+    plan = load(crawl.make(tmp_path / "edge.plan.npz", steps=2, stride=0.16, spacing=0.01))
+    ground, e = plan.terrain, plan.foot_names.index("RF")
+    rows, columns = ground.heights.shape
+    x = ground.origin[0] + ground.spacing[0] * np.arange(columns) - plan.foot_position[0, e, 0]
+    y = ground.origin[1] + ground.spacing[1] * np.arange(rows) - plan.foot_position[0, e, 1]
+    edge = (abs(x - 0.06) < 0.01) & (abs(y[:, None]) < 0.06)
+    with_edge = Heightfield(ground.heights + 0.07 * edge, ground.origin, ground.spacing)
+    trial = validate(replace(plan, terrain_raw=with_edge), Settings(second_opinion=False)).trials[1]
+    assert not trial.incidents
+    behind = trial.replay.foot[-1, e] - trial.reference.foot[-1, e]
+    assert np.linalg.norm(behind) < 0.02

@@ -1,6 +1,7 @@
 """`python -m warpgait.calibrate PLAN…`: what every metric comes to for good plans, and for the same ones spoiled in six ways.
 
-The limits in `metrics.py` are to lie between the two. Prints a Markdown table; `--csv` keeps every value.
+The limits in `metrics.py` are to lie between the two. Prints two Markdown tables: every metric's values, and how each spoiling was judged;
+`--csv` keeps every value.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import InputError
-from .metrics import Metric
+from .metrics import Metric, Verdict
 from .plan import Plan, load
 from .scene import Disturbance
 from .validation import Settings, validate
@@ -35,9 +36,13 @@ def _raised(plan: Plan) -> Plan:
 
 
 def _swapped(plan: Plan) -> Plan:
+    """Of two feet: those whose schedules differ most, for those of a trot's diagonal pair are the same."""
+    contact = plan.foot_contact
+    differ = (contact[:, :, None] != contact[:, None, :]).mean(0)
+    pair = list(np.unravel_index(differ.argmax(), differ.shape))
     order = np.arange(len(plan.foot_names))
-    order[[0, -1]] = order[[-1, 0]]
-    return replace(plan, foot_contact=plan.foot_contact[:, order])
+    order[pair] = order[pair[::-1]]
+    return replace(plan, foot_contact=contact[:, order])
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,20 @@ def table(values: Values, limits: dict[tuple[str, str], Metric]) -> list[str]:
     return lines
 
 
+Judged = dict[str, list[tuple[str, list[str]]]]  # by spoiling, for every plan: the verdict and the metrics that object to it
+
+
+def verdicts(judged: Judged) -> list[str]:
+    """Lines of Markdown: how often each spoiling passed, was marginal, failed; and which metrics object to how many of the plans."""
+    lines = ["| spoiling | pass | marginal | fail | objections |", "| --- " * 5 + "|"]
+    for name, plans in judged.items():
+        counts = [sum(verdict == v.word for verdict, _ in plans) for v in Verdict]
+        objections = Counter(metric for _, metrics in plans for metric in metrics)
+        words = ", ".join(f"{metric} ({count})" for metric, count in objections.most_common(5))
+        lines.append(f"| {name} | {' | '.join(map(str, counts))} | {words} |")
+    return lines
+
+
 def main(words: list[str] | None = None) -> int:
     """Run the command; 0, or 2 on bad input."""
     parser = argparse.ArgumentParser(prog="python -m warpgait.calibrate", description=__doc__)
@@ -93,13 +112,17 @@ def main(words: list[str] | None = None) -> int:
     options = parser.parse_args(words)
     values: Values = defaultdict(lambda: defaultdict(list))
     limits: dict[tuple[str, str], Metric] = {}
+    judged: Judged = {s.name: [] for s in (GOOD, *SPOILINGS)}
     rows = []
     try:
         for path in options.plans:
             plan = load(path)
             for spoiling in (GOOD, *SPOILINGS):
-                print(f"calibrate: {path.name}: {spoiling.name}", file=sys.stderr)
-                for metric in measure(plan, spoiling):
+                metrics = measure(plan, spoiling)
+                verdict = max(m.verdict for m in metrics)
+                judged[spoiling.name].append((verdict.word, [m.name for m in metrics if m.verdict is not Verdict.PASS]))
+                print(f"calibrate: {path.name}: {spoiling.name}: {verdict.word}", file=sys.stderr)
+                for metric in metrics:
                     key = metric.layer, metric.name
                     limits.setdefault(key, metric)
                     values[key][spoiling.name].append(metric.value)
@@ -110,7 +133,7 @@ def main(words: list[str] | None = None) -> int:
     except (InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print("\n".join(table(values, limits)))
+    print("\n".join([*table(values, limits), "", *verdicts(judged)]))
     return 0
 
 

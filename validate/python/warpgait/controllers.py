@@ -55,6 +55,7 @@ class Gains:
     stance_damping: float = 20.0
     reach_down: float = 0.01  # m
     touch_force: float = 20.0  # N, normal, the most that is asked of a foot in the air
+    step_over: tuple[float, float] = (2.0, 0.05)  # m/s, m: how fast and how far a foot rises that meets something on its way
     weight_com: float = 100.0
     weight_rotation: float = 7.0
     weight_swing: float = 5.0
@@ -63,6 +64,33 @@ class Gains:
     weight_acceleration: float = 1e-3
     least_normal_force: float = 5.0  # N, on feet that do not stick or do not touch yet
     joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
+
+
+class StepOver:
+    """A foot that touches in the first half of its swing has met an edge that the plan does not know, and would stay behind it: it rises.
+
+    Where the ground is as planned, nothing is touched there and nothing changes.
+    """
+
+    def __init__(self, reference: Reference, speed: float, limit: float) -> None:
+        """`speed` m/s and `limit` m of the rise."""
+        self._contact = reference.contact
+        self._progress = np.zeros(reference.contact.shape)  # share of the running swing that is over
+        for e in range(reference.contact.shape[1]):
+            edges = np.flatnonzero(np.diff(np.concatenate([[True], reference.contact[:, e], [True]])))
+            for a, b in edges.reshape(-1, 2):
+                self._progress[a:b, e] = np.arange(b - a) / (b - a)
+        self._step, self._speed, self._limit = speed * float(reference.t[1]), speed, limit
+        self._met = np.zeros(reference.contact.shape[1], bool)
+        self._risen = np.zeros(reference.contact.shape[1])
+
+    def update(self, k: int, touching: Bools) -> tuple[Array, Array]:
+        """Rise (E,) m of the feet's targets along the normal, and its speed (E,) m/s. Gone by the touch-down; to be called once a step."""
+        s, stance = self._progress[k], self._contact[k]
+        self._met = ~stance & (self._met | (touching & (s > 0.05) & (s < 0.5)))
+        rising = self._met & (self._risen < self._limit)
+        self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
+        return (1 - s**3 * (10 - 15 * s + 6 * s * s)) * self._risen, np.where(rising, self._speed, 0.0)
 
 
 class Controller(Protocol):
@@ -107,6 +135,7 @@ class WholeBody:
         self._cones = friction_cones(reference.normal, friction)
         self._narrow = friction_cones(reference.normal, IN_THE_AIR)
         self._last = np.zeros((E, 3))
+        self._step_over = StepOver(reference, *self.gains.step_over)
 
     def _tasks(self, k: int, data: Any, touching: Bools, bias: Array) -> Array:
         """Fill A q̈ = b for all tasks and return the rows' weights."""
@@ -122,6 +151,7 @@ class WholeBody:
         turn, spin = rotation_error(R.T @ ref.rotation[k]), R.T @ ref.angular_velocity[k] - v[3:6]
         self._b[3:6] = R.T @ ref.angular_acceleration[k] + g.rotation[0] * turn + g.rotation[1] * spin
         weights = [g.weight_com] * 3 + [g.weight_rotation] * 3
+        rise, rise_speed = self._step_over.update(k, touching)
         for e in range(len(index.feet)):
             center = data.site_xpos[index.site[e]]
             stance = ref.contact[k, e]
@@ -134,12 +164,10 @@ class WholeBody:
                 wanted = -g.stance_damping * velocity
             else:
                 # A foot that should stand but does not touch yet reaches for the ground, a little below the plan's.
-                target = ref.foot[k, e] - g.reach_down * ref.contact[k, e] * ref.normal[k, e]
-                wanted = (
-                    ref.foot_acceleration[k, e]
-                    + g.swing[0] * (target - center)
-                    + g.swing[1] * (ref.foot_velocity[k, e] - velocity)
-                )
+                n = ref.normal[k, e]
+                target = ref.foot[k, e] + (rise[e] - g.reach_down * ref.contact[k, e]) * n
+                rate = ref.foot_velocity[k, e] + rise_speed[e] * n
+                wanted = ref.foot_acceleration[k, e] + g.swing[0] * (target - center) + g.swing[1] * (rate - velocity)
             rows = slice(6 + 3 * e, 9 + 3 * e)
             self._A[rows] = J
             self._b[rows] = wanted - self._jacobian_rate @ v

@@ -80,9 +80,9 @@ def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric
         Metric(layer, "postures out of reach", float(result.unreachable.sum()), "", 0, 0),
         Metric(layer, "postures past a joint limit", float(result.beyond_limits.sum()), "", 0, 0),
         Metric(layer, "postures with other parts in the ground", float(len(result.in_ground)), "", 0, 0),
-        Metric(layer, "plan: unexplained force, rms", 100 * _rms(result.plan_residual[:, :3]) / mg, "% m g", 1, 5),
+        Metric(layer, "plan: unexplained force, rms", 100 * _rms(result.plan_residual[:, :3]) / mg, "% m g", 0.5, 5),
         Metric(
-            layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 1, 5
+            layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 0.5, 5
         ),
         Metric(layer, "full body: unexplained force, rms", _rms(result.body_residual[:, :3]) / mg, "m g", 0.05, 0.20),
         Metric(

@@ -14,8 +14,8 @@ from .svg import Line, chart, contact_bars
 from .validation import Trial, Validation
 
 _STYLE = """
-:root{color-scheme:light dark;--ink:#1c2330;--paper:#fff;--soft:#667;--line:#d8dce4;--plan:#2f6fde;--real:#d9641e;--pass:#1a7f4b;--marginal:#a66a00;--fail:#c0262d}
-@media(prefers-color-scheme:dark){:root{--ink:#e6e9f0;--paper:#14171d;--soft:#9aa3b2;--line:#2c323d;--plan:#6ea0ff;--real:#ff9a57;--pass:#4cc98a;--marginal:#e0a83a;--fail:#ff6b6f}}
+:root{color-scheme:light dark;--ink:#1c2330;--paper:#fff;--soft:#667;--line:#d8dce4;--plan:#2f6fde;--real:#d9641e;--pass:#1a7f4b;--marginal:#a66a00;--fail:#c0262d;--foot0:#2f6fde;--foot1:#d9641e;--foot2:#1a8a5f;--foot3:#9b3fc4}
+@media(prefers-color-scheme:dark){:root{--ink:#e6e9f0;--paper:#14171d;--soft:#9aa3b2;--line:#2c323d;--plan:#6ea0ff;--real:#ff9a57;--pass:#4cc98a;--marginal:#e0a83a;--fail:#ff6b6f;--foot0:#6ea0ff;--foot1:#ff9a57;--foot2:#4cc98a;--foot3:#cf8bf0}}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:60rem;margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem;margin:0}h2{font-size:1.1rem;margin:2rem 0 .5rem}.soft,.unit{color:var(--soft)}
 .verdict{font-size:1.25rem;font-weight:600}.pass{color:var(--pass)}.marginal{color:var(--marginal)}.fail{color:var(--fail)}
@@ -24,7 +24,9 @@ th,td{text-align:left;padding:.2rem .6rem .2rem 0;border-bottom:1px solid var(--
 figure{margin:1rem 0}figcaption{font-weight:600}svg{width:100%;height:auto}svg text{font-size:11px;fill:var(--soft)}
 .grid{stroke:var(--line)}.limit{stroke:var(--fail);stroke-dasharray:4 3}polyline{fill:none;stroke-width:1.4;stroke:var(--real)}
 polyline.planned{stroke:var(--plan)}rect.planned{fill:var(--plan)}rect.actual{fill:var(--real)}.key{font-weight:400;margin-left:.8rem}
-.key.planned{color:var(--plan)}.key.actual{color:var(--real)}.faint{opacity:.45}
+.key.planned{color:var(--plan)}.key.actual{color:var(--real)}.faint{opacity:.4}
+polyline.foot0{stroke:var(--foot0)}polyline.foot1{stroke:var(--foot1)}polyline.foot2{stroke:var(--foot2)}polyline.foot3{stroke:var(--foot3)}
+.key.foot0{color:var(--foot0)}.key.foot1{color:var(--foot1)}.key.foot2{color:var(--foot2)}.key.foot3{color:var(--foot3)}
 .film{display:grid;grid-template-columns:repeat(auto-fill,minmax(16rem,1fr));gap:.5rem}.film img{width:100%;border-radius:4px}
 """
 
@@ -50,11 +52,18 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
     forces = filtered_forces(r, ref)
     error = 1e3 * (r.com - ref.com[:K])
     parts = [contact_bars(v.index.feet, t, ref.contact[:K], contact, end)]
-    parts.append(
-        chart("Centre of mass: distance from plan", "mm", [Line(t, np.linalg.norm(error, axis=1), "actual")], (40, 100), end)
-    )
-    turn = np.degrees(np.linalg.norm(r.rotation_error, axis=1))
-    parts.append(chart("Trunk orientation: angle from plan", "°", [Line(t, turn, "actual")], (3, 8), end))
+    limits = {m.name: (m.passes, m.marginal) for m in trial.metrics}
+
+    def distance(title: str, unit: str, lines: list[Line], metric: str) -> str:
+        return chart(title, unit, lines, limits.get(metric, ()), end)
+
+    off = [Line(t, np.linalg.norm(error, axis=1), "actual")]
+    parts.append(distance("Centre of mass: distance from plan", "mm", off, "centre of mass, max"))
+    turn = [Line(t, np.degrees(np.linalg.norm(r.rotation_error, axis=1)), "actual")]
+    parts.append(distance("Trunk orientation: angle from plan", "°", turn, "rotation, max"))
+    apart = 1e3 * np.linalg.norm(r.foot - ref.foot[:K], axis=2)
+    feet = [Line(t, apart[:, e], f"foot{e % 4}", foot) for e, foot in enumerate(v.index.feet)]
+    parts.append(chart("Feet: distance from plan", "mm", feet, (), end))
     total = [
         Line(t, forces.planned[..., 2].sum(1), "planned", "planned"),
         Line(t, forces.simulated[..., 2].sum(1), "actual", "replayed"),
@@ -65,9 +74,9 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
         parts.append(chart(f"Vertical force, {foot}", "N", lines, (), end))
     for j, joint in enumerate(("HAA", "HFE", "KFE")):
         limit = float(v.index.torque_limit[:, j].max())
-        lines = [Line(t, r.torque[:, e, j], "actual") for e in range(len(v.index.feet))]
-        lines += [Line(v.plan.t[2:-2], v.analysis.torque[2:-2, e, j], "planned faint") for e in range(len(v.index.feet))]
-        parts.append(chart(f"Torque {joint}, all legs (blue: open loop)", "N m", lines, (-limit, limit), end))
+        lines = [Line(v.plan.t[2:-2], v.analysis.torque[2:-2, e, j], f"foot{e % 4} faint") for e in range(len(v.index.feet))]
+        lines += [Line(t, r.torque[:, e, j], f"foot{e % 4}", foot) for e, foot in enumerate(v.index.feet)]
+        parts.append(chart(f"Torque {joint} (faint: open loop)", "N m", lines, (-limit, limit), end))
     return parts
 
 
@@ -111,8 +120,9 @@ def render(v: Validation, pictures: list[tuple[float, bytes]], picture_note: str
                 for i in sorted(trial.incidents, key=lambda i: i.time)
             )
             parts.append(f"<ul>{items}</ul>")
-    parts.append("<h2>The whole-body replay over time, s</h2>")
-    parts += _plots(v, v.trials[0])
+    name = v.shown.name[0].upper() + v.shown.name[1:]
+    parts.append(f"<h2>{escape(name)}, over time in s</h2>")
+    parts += _plots(v, v.shown)
     return "\n".join(parts) + "</html>\n"
 
 

@@ -138,10 +138,20 @@ class Plan:
             return 1.2
 
 
+_NPZ, _NPY = b"PK\x03\x04", b"\x93NUM"  # how archives and single arrays begin
+
+
 def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
     """All arrays of the archive in memory, or a refusal that names the damaged member."""
+    if path.is_dir():
+        raise InputError(f"{path}: a folder, not a plan (NAME.plan.npz)")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
+    with path.open("rb") as file:
+        start = file.read(len(_NPZ))
+    if start != _NPZ and not start.startswith(_NPY):
+        what = "an empty file" if not start else "not an .npz archive"
+        raise InputError(f"{path}: {what}; a plan is a NAME.plan.npz that `warpgait solve` writes")
     arrays: dict[str, npt.NDArray[Any]] = {}
     member = ""
     try:
@@ -154,6 +164,8 @@ def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
     except InputError:
         raise
     except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:
+        if not zipfile.is_zipfile(path):
+            raise InputError(f"{path}: damaged: cut short, or not a whole .npz archive") from error
         where = f"member {member}: " if member else ""
         raise InputError(f"{path}: {where}not readable as a plan (damaged or not an .npz archive): {error}") from error
     return arrays

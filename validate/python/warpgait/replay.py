@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -65,26 +66,35 @@ class _Feet:
             (e, model.actuator(f"adhesion_{f}").id) for e, f in enumerate(index.feet) if _has_actuator(model, f"adhesion_{f}")
         ]
 
-    def read(self, data: Any) -> tuple[Array, Bools, list[int]]:
-        """Forces (E, 3), contact (E,), and the other geoms that touch the ground."""
-        E = len(self.index.feet)
-        force, touching = np.zeros((E, 3)), np.zeros(E, bool)
-        if data.ncon == 0:
-            return force, touching, []
-        geom, row = data.contact.geom, data.contact.efc_address
-        other = np.where(geom[:, 0] == self.ground, geom[:, 1], geom[:, 0])
-        foot = self.foot_of_geom[other]
-        active = np.flatnonzero((foot >= 0) & (row >= 0))
-        sign = np.where(geom[active, 0] == self.ground, 1.0, -1.0)[:, None]  # MuJoCo's force acts on the second geom
-        frame = data.contact.frame[active].reshape(-1, 3, 3)
+    def look(self, data: Any) -> Bools:
+        """Which feet touch the ground (E,); remembers this step's contacts for `forces`."""
+        geom = data.contact.geom.reshape(-1, 2)
+        self.first = geom[:, 0] == self.ground
+        self.other = np.where(self.first, geom[:, 1], geom[:, 0])
+        self.foot = self.foot_of_geom[self.other]
+        touching = np.zeros(len(self.index.feet) + 1, bool)
+        touching[self.foot] = True  # -1, no foot, lands in the spare last place
+        return touching[:-1]
+
+    def forces(self, data: Any) -> tuple[Array, list[int]]:
+        """Forces (E, 3) of the contacts seen by `look`, now that they are known, and the other geoms that touch the ground."""
+        E, contact = len(self.index.feet), data.contact
+        row = contact.efc_address
+        if len(row) != len(self.foot):  # the simulation blew up, and MuJoCo began anew
+            return np.zeros((E, 3)), []
+        active = np.flatnonzero((self.foot >= 0) & (row >= 0))
+        if not len(active):
+            return np.zeros((E, 3)), [int(g) for g in self.other[self.foot < 0]]
+        sign = np.where(self.first[active], 1.0, -1.0)[:, None]  # MuJoCo's force acts on the second geom
+        frame = contact.frame[active].reshape(-1, 3, 3)
         local = data.efc_force[row[active, None] + np.arange(3)]  # normal, two tangents: elliptic cones
-        np.add.at(force, foot[active], sign * (local[:, None] @ frame)[:, 0])
-        touching[foot[active]] = True
+        on_foot = self.foot[active] == np.arange(E)[:, None]  # (E, contacts)
+        force = np.asarray(on_foot @ (sign * (local[:, None] @ frame)[:, 0]), float)
         for e, actuator in self.adhesion:
-            if touching[e]:  # the actuator presses the foot on; the ground's net force is what remains
-                normal = (sign * frame[:, 0])[foot[active] == e].sum(0)
+            if on_foot[e].any():  # the actuator presses the foot on; the ground's net force is what remains
+                normal = (sign * frame[:, 0])[on_foot[e]].sum(0)
                 force[e] -= data.actuator_force[actuator] * normal / np.linalg.norm(normal)
-        return force, touching, [int(g) for g in other[foot < 0]]
+        return force, [int(g) for g in self.other[self.foot < 0]]
 
 
 def _has_actuator(model: Any, name: str) -> bool:
@@ -163,7 +173,8 @@ def run(
         for sub in range(substeps):
             mujoco.mj_step1(world, data)
             if sub == 0:
-                seen = measured.take(data.qpos, data.qvel, _touching(data, ground, E))
+                touching = ground.look(data)
+                seen = measured.take(data.qpos, data.qvel, touching)
                 torque = controller.torque(k, measured.data, seen)
                 data.ctrl[motors] = torque.ravel()
                 for e, actuator in ground.adhesion:
@@ -173,17 +184,17 @@ def run(
                 centers = data.site_xpos[index.site].copy()
             mujoco.mj_step2(world, data)
             if sub == 0:
-                force, touching_now, stray = ground.read(data)
+                force, stray = ground.forces(data)
         if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all():
             fall = Incident(max(step * period, 0.0), "the simulation blew up")
             break
-        for e in map(int, np.flatnonzero(touching_now & reference.contact[k])):
+        for e in map(int, np.flatnonzero(touching & reference.contact[k])):
             mujoco.mj_jac(world, data, jacobian, None, centers[e] - index.radius * reference.normal[k, e], index.body[e])
             velocity = jacobian @ data.qvel
             n = reference.normal[k, e]
-            slip[e] = np.linalg.norm(velocity - n * (n @ velocity)) * period
-        tilt = np.arccos(np.clip(data.xmat[base].reshape(3, 3)[:, 2] @ reference.rotation[k][:, 2], -1, 1))
-        off = float(np.linalg.norm(reference.com[k] - state[2]))
+            slip[e] = math.hypot(*(velocity - n * (n @ velocity))) * period
+        tilt = math.acos(min(1.0, max(-1.0, data.xmat[base].reshape(3, 3)[:, 2] @ reference.rotation[k][:, 2])))
+        off = math.dist(reference.com[k], state[2])
         if stray and first_stray is None and step >= 0:
             body = world.body(world.geom_bodyid[stray[0]]).name
             first_stray = Incident(
@@ -229,14 +240,3 @@ def run(
         fall=fall,
         first_stray=first_stray,
     )
-
-
-def _touching(data: Any, ground: _Feet, feet: int) -> Bools:
-    """Which feet are in contact, before forces are known."""
-    result = np.zeros(feet + 1, bool)
-    if data.ncon == 0:
-        return result[:-1]
-    geom = data.contact.geom
-    other = np.where(geom[:, 0] == ground.ground, geom[:, 1], geom[:, 0])
-    result[ground.foot_of_geom[other]] = True  # -1, no foot, lands in the spare last place
-    return result[:-1]

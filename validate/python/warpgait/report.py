@@ -107,7 +107,7 @@ def write_error(target: Path, plan: str, message: str) -> None:
 
 
 def write_replay(v: Validation, target: Path) -> None:
-    """The counted whole-body replay at control rate, for people who want joint trajectories.
+    """The whole-body replay on the planned heightfield at control rate, for people who want joint trajectories.
 
     Members: `t` (K,) s; `base_position` (K,3) m, the base body's origin (not the centre of mass); `base_quaternion_wxyz` (K,4);
     `base_linear_velocity` (K,3) m/s, world; `base_angular_velocity` (K,3) rad/s, base frame; `center_of_mass` (K,3);

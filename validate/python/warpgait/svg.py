@@ -10,6 +10,7 @@ import numpy as np
 
 from .plan import Array, Bools
 
+FAR = 4.0  # a limit so many times larger than all values would flatten them
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 720, 190, 52, 24, 10
 
 
@@ -44,8 +45,10 @@ def _path(line: Line, sx: tuple[float, float], sy: tuple[float, float], points: 
 
 
 def chart(title: str, unit: str, lines: Sequence[Line], limits: Sequence[float] = (), end: float | None = None) -> str:
-    """A line chart over time with dashed lines at `limits`."""
-    values = np.concatenate([line.y[np.isfinite(line.y)] for line in lines] + [np.asarray(limits, float), [0.0]])
+    """A line chart over time with dashed lines at `limits`, those that are far off only in words."""
+    largest = max((float(np.abs(line.y[np.isfinite(line.y)]).max(initial=0.0)) for line in lines), default=0.0)
+    drawn = [v for v in limits if abs(v) <= FAR * largest]
+    values = np.concatenate([line.y[np.isfinite(line.y)] for line in lines] + [np.asarray(drawn, float), [0.0]])
     low, high = float(values.min()), float(values.max())
     if high - low < 1e-9:
         high = low + 1.0
@@ -54,6 +57,8 @@ def chart(title: str, unit: str, lines: Sequence[Line], limits: Sequence[float] 
     t1 = end or max(float(line.x[-1]) for line in lines)
     width, height = WIDTH - LEFT - 8, HEIGHT - BOTTOM - TOP
     sx, sy = (LEFT, width / t1), (TOP + height * high / (high - low), -height / (high - low))
+    off = ", ".join(f"{v:g}" for v in limits if v not in drawn)
+    unit += f"; limits far above: {off}" if off else ""
     parts = [f'<figure><figcaption>{escape(title)} <span class="unit">{escape(unit)}</span>']
     parts += [f' <span class="key {line.style}">{escape(line.label)}</span>' for line in lines if line.label]
     parts.append(f'</figcaption><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title)}">')
@@ -66,7 +71,7 @@ def chart(title: str, unit: str, lines: Sequence[Line], limits: Sequence[float] 
         parts.append(f'<text x="{x:.1f}" y="{HEIGHT - 6}" text-anchor="middle">{v:g}</text>')
     parts += [
         f'<line class="limit" x1="{LEFT}" x2="{WIDTH - 8}" y1="{sy[0] + sy[1] * v:.1f}" y2="{sy[0] + sy[1] * v:.1f}"/>'
-        for v in limits
+        for v in drawn
     ]
     parts += [_path(line, sx, sy) for line in lines]
     return "".join(parts) + "</svg></figure>"

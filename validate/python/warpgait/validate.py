@@ -9,8 +9,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import sys
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,11 +93,31 @@ def _refuse_nonsense(options: argparse.Namespace) -> None:
         raise InputError(f"--noise {options.noise:g}: must be in [0, 100]")
     if not 0 <= options.delay <= 0.2:
         raise InputError(f"--delay {options.delay:g}: must be in [0, 0.2] s")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: must not be negative")
+    if options.push is not None and not options.push[1] > 0:
+        raise InputError(f"--push: the duration, {options.push[1]:g} s, must be positive")
+    if not 50 <= options.rate <= 500 or 500 % options.rate:
+        raise InputError(f"--rate {options.rate:g}: must be 500 Hz divided by a whole number, and at least 50")
+
+
+@contextmanager
+def _without_opengl() -> Iterator[None]:
+    """MuJoCo loads the OpenGL that $MUJOCO_GL names as it is imported, and fails where there is none; only the rendering process needs it."""
+    wished = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        os.environ.pop("MUJOCO_GL")
+        if wished is not None:
+            os.environ["MUJOCO_GL"] = wished
 
 
 def _run(options: argparse.Namespace, folder: Path) -> int:
     try:
-        from . import plan, report, scene, validation
+        with _without_opengl():
+            from . import plan, report, scene, validation
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco==3.17.0 daqp numpy scipy") from error
 
@@ -102,8 +125,12 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
         if not (options.quiet or options.json):
             print(f"validate: {text}", file=sys.stderr)
 
-    _refuse_nonsense(options)
     loaded = plan.load(options.plan)
+    if not options.no_files:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: no folder for the reports ({error.strerror}); name another one with --output") from error
     disturbance = scene.Disturbance(
         friction=options.friction,
         mass_factor=options.mass_factor,
@@ -118,12 +145,16 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
 
     if not options.no_files:
         _write(options, folder, found, say)
-    if options.json:
-        print(json.dumps(report.as_dict(found), allow_nan=False))
-    else:
-        _summary(found)
-        if not options.no_files:
-            print(f"{folder / _stem(options.plan)}.report.html")
+    try:
+        if options.json:
+            print(json.dumps(report.as_dict(found), allow_nan=False))
+        else:
+            _summary(found)
+            if not options.no_files:
+                print(f"{folder / _stem(options.plan)}.report.html")
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read our output has enough of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0 if report.trackable(found) else 1
 
 
@@ -131,7 +162,6 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
     """The report, the replay, and pictures and film as asked for."""
     from . import film, page, report
 
-    folder.mkdir(parents=True, exist_ok=True)
     stem = _stem(options.plan)
     pictures: list[tuple[float, bytes]] = []
     note = None
@@ -173,15 +203,30 @@ def main(words: list[str] | None = None) -> int:
     options = arguments().parse_args(words)
     folder = options.output or options.plan.parent
     try:
+        _refuse_nonsense(options)
+    except InputError as error:
+        _say_error(options, str(error))
+        return 2
+    try:
         return _run(options, folder)
     except (InputError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        _say_error(options, str(error))
         if not options.no_files and options.plan.is_file() and folder.is_dir():
             _report_error(folder / f"{_stem(options.plan)}.report.json", options.plan.name, str(error))
         return 2
     except KeyboardInterrupt:
         print("validate: interrupted", file=sys.stderr)
         return 130
+    except Exception:  # exit code 1 means "not trackable", which an error in this program must not say
+        traceback.print_exc()
+        _say_error(options, "the replay itself failed; please report it with the plan")
+        return 2
+
+
+def _say_error(options: argparse.Namespace, message: str) -> None:
+    print(f"error: {message}", file=sys.stderr)
+    if options.json:
+        print(json.dumps({"plan": options.plan.name, "verdict": "error", "trackable": False, "error": message}))
 
 
 def _report_error(target: Path, plan: str, message: str) -> None:

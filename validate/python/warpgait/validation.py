@@ -42,6 +42,7 @@ class Trial:
 
     name: str
     counts: bool  # towards the verdict
+    terrain: Heightfield
     reference: Reference
     replay: Replay
     metrics: list[Metric]
@@ -73,6 +74,11 @@ class Validation:
     def verdict(self) -> Verdict:
         """The worst of the open loop and of the trials that count."""
         return max([m.verdict for m in self.metrics] + [t.verdict for t in self.trials if t.counts])
+
+    @property
+    def shown(self) -> Trial:
+        """The replay to look at: of those that count, the first with the worst verdict."""
+        return max((t for t in self.trials if t.counts), key=lambda t: t.verdict)
 
     @property
     def first_failure(self) -> Incident | None:
@@ -136,17 +142,20 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     def whole_body() -> WholeBody:
         return WholeBody(own, index, coarse, plan.robot.friction, pull, preload)
 
-    todo: list[tuple[str, bool, Any, Reference, Any]] = [("closed loop", True, world, coarse, whole_body())]
+    todo: list[tuple[str, bool, Heightfield, Any, Reference, Any]] = [
+        ("closed loop", True, plan.terrain, world, coarse, whole_body())
+    ]
     if settings.raw and plan.terrain_raw is not None:
-        todo.append(("closed loop, raw terrain", True, world_on(plan.terrain_raw), coarse, whole_body()))
+        raw = plan.terrain_raw
+        todo.append(("closed loop, raw terrain", True, raw, world_on(raw), coarse, whole_body()))
     if settings.second_opinion:
         joints = analysis.qpos[:, index.qpos]
-        todo.append(("second opinion: joint PD", False, world, fine, JointPD(own, index, fine, plan.t, joints)))
+        todo.append(("second opinion: joint PD", False, plan.terrain, world, fine, JointPD(own, index, fine, plan.t, joints)))
     trials = []
-    for name, counts, model, reference, controller in todo:
+    for name, counts, terrain, model, reference, controller in todo:
         say(name)
         replay = run(model, own, world_index, reference, controller, analysis.qpos[0], settings.disturbance)
-        trials.append(Trial(name, counts, reference, replay, *closed_loop(plan, replay, reference, index, name)))
+        trials.append(Trial(name, counts, terrain, reference, replay, *closed_loop(plan, replay, reference, index, name)))
     notes = _notes(plan, own, path, index)
     seconds = time.perf_counter() - started
     return Validation(plan, path, world, world_index, settings, analysis, metrics, incidents, trials, notes, seconds)
