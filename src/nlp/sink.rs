@@ -21,19 +21,46 @@ impl Pattern {
     pub fn record(say: impl FnOnce(&mut Sink)) -> Self {
         let mut sink = Sink { places: Vec::new(), slots: &[], cursor: 0, values: &mut [] };
         say(&mut sink);
-        let places = sink.places;
-        let mut unique = places.clone();
-        unique.sort_unstable();
-        unique.dedup();
-        let slots = places
-            .iter()
-            .map(|place| unique.binary_search(place).expect("every place is among the unique ones") as u32)
-            .collect();
-        Self {
-            rows: unique.iter().map(|p| p.0 as i32).collect(),
-            columns: unique.iter().map(|p| p.1 as i32).collect(),
-            slots,
+        Self::of(&sink.places)
+    }
+
+    /// Row by row, for places number a hundred to a slot: sorting them all took a tenth of a solve.
+    fn of(places: &[(u32, u32)]) -> Self {
+        let size =
+            |of: fn(&(u32, u32)) -> u32| places.iter().map(|place| of(place) as usize + 1).max().unwrap_or(0);
+        let (rows, columns) = (size(|place| place.0), size(|place| place.1));
+        let mut starts = vec![0usize; rows + 1];
+        places.iter().for_each(|place| starts[place.0 as usize + 1] += 1);
+        (0..rows).for_each(|row| starts[row + 1] += starts[row]);
+        let mut by_row = vec![0u32; places.len()];
+        let mut next = starts.clone();
+        for (n, place) in places.iter().enumerate() {
+            by_row[next[place.0 as usize]] = n as u32;
+            next[place.0 as usize] += 1;
         }
+        let mut pattern = Self { slots: vec![0; places.len()], ..Self::default() };
+        let mut slot_of = vec![u32::MAX; columns];
+        let mut unique: Vec<u32> = Vec::new();
+        for row in 0..rows {
+            let said = &by_row[starts[row]..starts[row + 1]];
+            for &n in said {
+                let column = places[n as usize].1;
+                if std::mem::replace(&mut slot_of[column as usize], 0) == u32::MAX {
+                    unique.push(column);
+                }
+            }
+            unique.sort_unstable();
+            for &column in &unique {
+                slot_of[column as usize] = pattern.rows.len() as u32;
+                pattern.rows.push(row as i32);
+                pattern.columns.push(column as i32);
+            }
+            for &n in said {
+                pattern.slots[n as usize] = slot_of[places[n as usize].1 as usize];
+            }
+            unique.drain(..).for_each(|column| slot_of[column as usize] = u32::MAX);
+        }
+        pattern
     }
 
     /// Number of slots.
