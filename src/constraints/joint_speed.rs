@@ -22,7 +22,7 @@ use crate::trajectory::layout::Phase;
 
 /// Of the limit. The rest is for what happens between samples and for what the plan does not know: the legs' own mass moves the trunk against
 /// the centre of mass.
-const SHARE: f64 = 0.74;
+const SHARE: f64 = 0.72;
 
 /// Speeds of swinging legs.
 #[derive(Clone, Debug)]
