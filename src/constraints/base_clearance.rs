@@ -10,8 +10,10 @@ use nalgebra::Vector3;
 
 use super::{Constraint, Place, height_form};
 use crate::heightfield::HeightJet;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{BaseNode, Curvature, Tangent};
+use crate::nlp::state::BaseNode;
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::cross_matrix;
 

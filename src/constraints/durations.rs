@@ -10,8 +10,8 @@
 //! in order of time, s.
 
 use super::{Constraint, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 use crate::trajectory::switches::SHORTEST_SWING;
 

@@ -21,9 +21,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Constraint, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::{cross_matrix, skew_part};
 

@@ -11,8 +11,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::stance::all_stances;
 use super::{Constraint, Place};
 use crate::heightfield::HeightJet;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, FootNode, Tangent};
+use crate::nlp::state::FootNode;
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 
 /// Footholds on gentle ground.

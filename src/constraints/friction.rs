@@ -15,9 +15,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Constraint, Normal, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::model::CONE_ROUNDING;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 

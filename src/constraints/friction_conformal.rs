@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 
 use super::friction::{Cone, ForcePlace, force_node, force_places};
 use super::{Constraint, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// Pulled-back forces inside the constant cone.

@@ -9,8 +9,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Constraint, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 
 /// The end of the motion.

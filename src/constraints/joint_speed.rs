@@ -14,8 +14,8 @@
 use super::{Constraint, Place, reach};
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;

@@ -14,9 +14,10 @@ use super::friction::{ForcePlace, force_places};
 use super::{Constraint, Place, reach};
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::cross_matrix;
 

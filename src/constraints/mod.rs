@@ -21,8 +21,8 @@ pub mod swing;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::heightfield::HeightJet;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// Where and when a row acts.

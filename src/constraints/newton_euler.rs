@@ -21,9 +21,10 @@ use num_dual::{DualNum, hessian, jacobian};
 use super::dynamics::Dynamics;
 use super::{Constraint, Place};
 use crate::nlp::Model;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, State};
+use crate::nlp::state::State;
 use crate::trajectory::LinearNode;
 
 /// (roll, pitch, yaw), their rates and second derivatives.

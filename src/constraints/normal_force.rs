@@ -9,9 +9,9 @@
 
 use super::friction::{ForcePlace, force_places, say_blocks, with_tangents};
 use super::{Constraint, Normal, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::model::LEAST_NORMAL_FORCE;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// Normal forces within limits.

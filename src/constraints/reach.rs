@@ -7,8 +7,9 @@
 //! Rows: for each place (foot, sample), x, y, z in the base frame, m.
 
 use super::{Constraint, Place};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;

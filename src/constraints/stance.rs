@@ -10,8 +10,9 @@
 //! Rows: one a stance, m.
 
 use super::{Constraint, Place, height_form};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, Tangent};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 
 /// Footholds on the ground.

@@ -15,8 +15,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Constraint, Place, distance};
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{Curvature, FootNode, Tangent, swing_points};
+use crate::nlp::state::{FootNode, swing_points};
+use crate::nlp::tangent::Tangent;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;

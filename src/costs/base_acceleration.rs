@@ -3,8 +3,8 @@
 //! Exact up to the trapezoidal rule: the base's acceleration is linear between the samples, and linear in the variables.
 
 use super::Cost;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// A base that moves evenly.

@@ -7,8 +7,8 @@
 use nalgebra::Vector3;
 
 use super::Cost;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 

@@ -7,8 +7,8 @@ pub mod force_rate;
 pub mod posture;
 pub mod swing_acceleration;
 
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// A named term of the objective.

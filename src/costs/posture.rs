@@ -6,8 +6,8 @@ use nalgebra::Matrix3;
 
 use super::Cost;
 use crate::constraints::reach;
+use crate::nlp::curvature::Curvature;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::Curvature;
 use crate::nlp::{Model, State};
 
 /// Footholds near the nominal ones.

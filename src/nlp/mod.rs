@@ -8,6 +8,7 @@
 //! A constraint sees ambient quantities alone; which space the variables live in changes only how the nodes are pushed
 //! forward. So the two formulations differ in nothing else.
 
+pub mod curvature;
 pub mod derivatives;
 pub mod guess;
 pub mod model;
@@ -15,6 +16,7 @@ pub mod problem;
 pub mod sink;
 pub mod solve;
 pub mod state;
+pub mod tangent;
 pub mod violation;
 
 pub use model::Model;

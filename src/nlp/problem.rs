@@ -25,9 +25,10 @@ use crate::ipopt::NlpProblem;
 use crate::scenario::{Cone, Law, Scenario};
 use crate::trajectory::spline::SWING_CONTROL_POINTS;
 
+use super::curvature::Curvature;
 use super::model::Model;
 use super::sink::{Pattern, Sink};
-use super::state::{Curvature, State};
+use super::state::State;
 
 /// Asked for beyond `base_clearance`, m, so that it holds between the points and samples that are looked at.
 const CLEARANCE_MARGIN: f64 = 0.01;
