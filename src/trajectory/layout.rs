@@ -118,6 +118,8 @@ pub struct Layout {
     pub feet: Vec<FootVariables>,
     /// `phase[foot][k]`.
     pub phase: Vec<Vec<Phase>>,
+    /// The same half way from each sample to the next.
+    phase_between: Vec<Vec<Phase>>,
     /// `nearest_stance[foot][k]`: the stance that a force at a sample belongs to.
     nearest_stance: Vec<Vec<usize>>,
 }
@@ -144,6 +146,7 @@ impl Layout {
             base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
+            phase_between: Vec::new(),
             nearest_stance: Vec::new(),
         };
         layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
@@ -190,6 +193,7 @@ impl Layout {
             .collect();
         self.feet.push(FootVariables { stances, swings });
         self.phase.push(Vec::new());
+        self.phase_between.push(Vec::new());
         self.nearest_stance.push(Vec::new());
         self.set_phases(foot);
     }
@@ -198,6 +202,8 @@ impl Layout {
         let times = (0..=self.intervals).map(|k| k as f64);
         self.nearest_stance[foot] = times.clone().map(|time| self.stance_near(foot, time)).collect();
         self.phase[foot] = times.map(|time| self.phase_of(foot, time)).collect();
+        let middles = (0..self.intervals).map(|k| Instant::Between(k).time());
+        self.phase_between[foot] = middles.map(|time| self.phase_of(foot, time)).collect();
     }
 
     /// Takes the switches from x for good: from now on phases, feet and forces are those of the motion x.
@@ -296,7 +302,7 @@ impl Layout {
     pub fn phase_at(&self, foot: usize, instant: Instant) -> Phase {
         match instant {
             Instant::Sample(k) => self.phase[foot][k],
-            Instant::Between(_) => self.phase_of(foot, instant.time()),
+            Instant::Between(k) => self.phase_between[foot][k],
         }
     }
 
