@@ -79,6 +79,26 @@ fn a_medium_hill_is_met_to_a_millimetre() {
     check_map(&map, &field, 1e-3);
 }
 
+/// From the shear alone this one is twisted (18 % of conformal error at the ground) and folded.
+#[test]
+fn a_peak_of_slope_three_is_neither_twisted_nor_folded() {
+    let field = hilly(3.0);
+    let (map, report) = build(&field, &spec([24, 24, 8]), &mut go_on).unwrap();
+    assert!(report.inverted_points == 0, "{report:?}");
+    assert!(report.conformal_ground.mean < 0.12, "{report:?}");
+    check_map(&map, &field, 0.2);
+}
+
+#[test]
+fn more_weight_at_the_torso_makes_the_map_gentler_there() {
+    let field = hilly(1.0);
+    let made =
+        |torso_weight| build(&field, &MapSpec { torso_weight, ..spec([24, 24, 8]) }, &mut go_on).unwrap().1;
+    let (light, heavy) = (made(0.03), made(0.3));
+    assert!(heavy.conformal_torso.mean < light.conformal_torso.mean);
+    assert!(heavy.conformal_ground.mean > light.conformal_ground.mean);
+}
+
 #[test]
 fn flat_ground_needs_no_warp() {
     let field = terrain(|_, _| 0.2);
@@ -119,7 +139,7 @@ fn progress_falls_and_may_stop_the_work() {
     })
     .unwrap();
     for pair in seen.windows(2) {
-        assert!(pair[0].cells != pair[1].cells || pair[1].energy <= pair[0].energy);
+        assert!(pair[1].iteration == 0 || pair[1].energy <= pair[0].energy);
     }
     let last = seen.last().unwrap();
     assert!(last.cells == [24, 24, 8] && last.decrement <= last.tolerance);

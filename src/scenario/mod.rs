@@ -442,11 +442,21 @@ pub struct MapSpec {
     /// Height of the box, m.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub thickness: f64,
+    /// What the energy counts well above the ground, where the torso is, of what it counts at the ground. More makes the map
+    /// gentler there and less conformal at the ground. (dirichlet counts everything alike, shear nothing.)
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub torso_weight: f64,
 }
 
 impl Default for MapSpec {
     fn default() -> Self {
-        Self { method: MapMethod::Mips, scale: MapScale::Trace, cells: None, thickness: 2.5 }
+        Self {
+            method: MapMethod::Mips,
+            scale: MapScale::Trace,
+            cells: None,
+            thickness: 2.5,
+            torso_weight: 0.03,
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use super::distance::Distance;
 use super::gauss_newton::gauss_newton;
 use super::lbfgs::{Limits, Outcome, minimize};
 use super::local_global::alternate;
-use super::problem::Problem;
+use super::problem::{Problem, Quadrature};
 use super::report::{EnergyHistory, MapReport, RejectedMap};
 use crate::heightfield::Heightfield;
 use crate::scenario::{MapMethod, MapSpec};
@@ -42,12 +42,18 @@ const MAX_ITERATIONS: usize = 600;
 const MAX_COARSE_ITERATIONS: usize = 150;
 /// In how many steps ground is grown, and the iterations on each but the last.
 const GROWTH_STEPS: usize = 8;
-const GROWTH_ITERATIONS: usize = 30;
+const GROWTH_ITERATIONS: usize = 60;
+/// On the coarsest grid, the map that was grown from flat ground is kept if its energy is less than this share of that of the one
+/// that started from the shear: over a peak of slope 3, the shear's is twisted, with twice the error at the ground.
+const WORTH_GROWING: f64 = 0.99;
+/// What is tried in turn while the map is folded between its points, as happens at the top of the box over ground of slope 3: a
+/// greater weight of what is above the ground, by these factors, and at last more points a cell.
+const RETRIES: [(Rule, f64); 3] = [(Rule::Lobatto, 3.0), (Rule::Lobatto, 10.0), (Rule::Gauss, 10.0)];
 /// The coarsest grid has at least this many cells along each axis, where the numbers can be halved at all.
 const COARSEST: usize = 8;
 
 /// By how much cells are to be halved along x and y where the scenario does not give them: when the bottom misses the terrain by
-/// more than the first. Beyond the second the terrain has edges that cells half as large do not follow either, m.
+/// more than the first. Beyond the second the terrain has edges or peaks that cells half as large do not follow either, m.
 const WORTH_REFINING: std::ops::Range<f64> = 1e-3..1e-2;
 
 /// Finds the map over a terrain by the method of `spec`. F's box stands over the terrain's rectangle.
@@ -166,28 +172,25 @@ fn optimized<D: Density>(
 ) -> Result<(WarpMap, MapReport)> {
     let (outcome, notes, history) = (Outcome::default(), Vec::new(), Vec::new());
     let mut run = Run { field, density, minimizer, progress, outcome, notes, history };
-    let map = run.coarse_to_fine(spec, Rule::Lobatto)?;
-    let report = MapReport::measure(&map, field, spec.method);
-    let mut best = (map, report, run.outcome);
-    if best.1.inverted_points > 0 && !density.may_fold() {
-        // More points a cell leave less room for folds between them.
-        run.notes.push(
-            "the first map was folded between its quadrature points; it was built again with four Gauss points a cell and axis".into(),
-        );
-        let map = run.coarse_to_fine(spec, Rule::Gauss)?;
-        let report = MapReport::measure(&map, field, spec.method);
-        if report.inverted_points < best.1.inverted_points {
-            best = (map, report, run.outcome);
+    let mut best = run.attempt(spec, Quadrature { rule: Rule::Lobatto, torso_weight: spec.torso_weight })?;
+    for (rule, factor) in RETRIES {
+        if best.report.inverted_points == 0 || density.may_fold() {
+            break;
         }
+        let points = Quadrature { rule, torso_weight: factor * spec.torso_weight };
+        run.notes.push(format!(
+            "the map was folded between its quadrature points; it was built again with torso_weight {:.2}{}",
+            points.torso_weight,
+            if rule == Rule::Gauss { " and four Gauss points a cell and axis" } else { "" }
+        ));
+        best = best.or_better(run.attempt(spec, points)?);
     }
-    if worth_refining(spec, &best.1) {
-        let map = run.minimized(&best.0.refined([true, true, false]), Rule::Lobatto, MAX_ITERATIONS)?;
-        let report = MapReport::measure(&map, field, spec.method);
-        if report.inverted_points <= best.1.inverted_points && report.misfit_max < best.1.misfit_max {
-            best = (map, report, run.outcome);
-        }
+    if worth_refining(spec, &best.report) {
+        let map = run.minimized(&best.map.refined([true, true, false]), best.points, MAX_ITERATIONS)?;
+        let points = best.points;
+        best = best.or_better(run.measured(map, spec, points));
     }
-    let (map, mut report, outcome) = best;
+    let Attempt { map, mut report, outcome, .. } = best;
     report.converged = outcome.converged;
     report.energy = outcome.value;
     report.iterations = run.outcome.iterations;
@@ -203,6 +206,22 @@ fn optimized<D: Density>(
     Ok((map, report))
 }
 
+/// A map, what it is like, and how it was found.
+struct Attempt {
+    map: WarpMap,
+    report: MapReport,
+    outcome: Outcome,
+    points: Quadrature,
+}
+
+impl Attempt {
+    /// The one that is folded at fewer points; where both are at as many, the one closer to the terrain.
+    fn or_better(self, other: Attempt) -> Attempt {
+        let badness = |a: &Attempt| (a.report.inverted_points, a.report.misfit_max);
+        if badness(&other) < badness(&self) { other } else { self }
+    }
+}
+
 /// One building of a map, with what has been spent on it.
 struct Run<'a, D> {
     field: &'a Heightfield,
@@ -216,7 +235,17 @@ struct Run<'a, D> {
 }
 
 impl<D: Density> Run<'_, D> {
-    fn coarse_to_fine(&mut self, spec: &MapSpec, rule: Rule) -> Result<WarpMap> {
+    fn attempt(&mut self, spec: &MapSpec, points: Quadrature) -> Result<Attempt> {
+        let map = self.coarse_to_fine(spec, points)?;
+        Ok(self.measured(map, spec, points))
+    }
+
+    fn measured(&self, map: WarpMap, spec: &MapSpec, points: Quadrature) -> Attempt {
+        let report = MapReport::measure(&map, self.field, spec.method);
+        Attempt { map, report, outcome: self.outcome, points }
+    }
+
+    fn coarse_to_fine(&mut self, spec: &MapSpec, points: Quadrature) -> Result<WarpMap> {
         let mut cells = spec.cells();
         let mut halvings = Vec::new();
         loop {
@@ -227,15 +256,35 @@ impl<D: Density> Run<'_, D> {
             cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
             halvings.push(halve);
         }
-        let mut map = WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..spec.clone() })?;
+        let coarsest = MapSpec { cells: Some(cells), ..spec.clone() };
+        let mut map = WarpMap::shear(self.field, &coarsest)?;
         for halve in halvings.into_iter().rev() {
-            map = self.minimized(&map, rule, MAX_COARSE_ITERATIONS)?.refined(halve);
+            map = match map.cells() == cells {
+                true => self.coarsest(&map, &coarsest, points)?,
+                false => self.minimized(&map, points, MAX_COARSE_ITERATIONS)?,
+            }
+            .refined(halve);
         }
-        self.minimized(&map, rule, MAX_ITERATIONS)
+        self.minimized(&map, points, MAX_ITERATIONS)
+    }
+
+    /// Like `minimized`, from the shear and from flat ground that grows: the better one.
+    fn coarsest(&mut self, shear: &WarpMap, spec: &MapSpec, points: Quadrature) -> Result<WarpMap> {
+        let sheared = self.minimized(shear, points, MAX_COARSE_ITERATIONS)?;
+        if self.density.may_fold() {
+            return Ok(sheared);
+        }
+        let flat = WarpMap::flat(self.field.extent(), spec)?;
+        let mut problem = Problem::new(self.field, self.density, &flat, points)?;
+        let mut u = problem.coefficients(&flat);
+        let grown = self.grown(&mut problem, &mut u, GROWTH_STEPS, MAX_COARSE_ITERATIONS)?;
+        let better = grown.value.is_finite()
+            && problem.bending(&u) < WORTH_GROWING * problem.bending(&problem.coefficients(&sheared));
+        Ok(if better { problem.to_map(&u, &flat) } else { sheared })
     }
 
     /// The minimizer on the grid of `start`, the map of a coarser grid.
-    fn minimized(&mut self, start: &WarpMap, rule: Rule, iterations: usize) -> Result<WarpMap> {
+    fn minimized(&mut self, start: &WarpMap, points: Quadrature, iterations: usize) -> Result<WarpMap> {
         let cells = start.cells();
         let thickness = start.size()[2];
         let shear =
@@ -243,22 +292,9 @@ impl<D: Density> Run<'_, D> {
         // What is fine on the coarser grid may fold when it is moved onto the ground that only this one sees: then that
         // ground is grown in steps. The shear is never folded.
         for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
-            let mut problem = Problem::new(self.field, self.density, map, rule)?;
+            let mut problem = Problem::new(self.field, self.density, map, points)?;
             let mut u = problem.coefficients(map);
-            let gap = problem.gap(&u);
-            let mut outcome = Outcome::default();
-            for step in 1..=steps {
-                problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
-                problem.seat(&mut u);
-                if iterations < MAX_ITERATIONS {
-                    problem.forgive_misfit(&u);
-                }
-                let iterations = if step < steps { GROWTH_ITERATIONS } else { iterations };
-                outcome = self.run(&mut problem, &mut u, cells, iterations)?;
-                if !outcome.value.is_finite() {
-                    break;
-                }
-            }
+            let outcome = self.grown(&mut problem, &mut u, steps, iterations)?;
             if outcome.value.is_finite() {
                 self.outcome.converged = outcome.converged;
                 self.outcome.value = outcome.value;
@@ -269,14 +305,34 @@ impl<D: Density> Run<'_, D> {
         Err(Error::Internal("the shear onto the terrain is folded".into()))
     }
 
-    /// One run of the optimizer; it is added to what has been spent.
-    fn run(
+    /// The minimizer, while the ground under the bottom face of u grows from where that is to the terrain; the outcome of the last
+    /// step, or of the first that folds, whose value is infinite.
+    fn grown(
         &mut self,
         problem: &mut Problem<'_, D>,
         u: &mut Vec<f64>,
-        cells: [usize; 3],
+        steps: usize,
         iterations: usize,
     ) -> Result<Outcome> {
+        let base = problem.bottom_face(u);
+        let mut outcome = Outcome::default();
+        for step in 1..=steps {
+            problem.grow_ground(&base, step as f64 / steps as f64);
+            problem.seat(u);
+            if iterations < MAX_ITERATIONS {
+                problem.forgive_misfit(u);
+            }
+            outcome = self.run(problem, u, if step < steps { GROWTH_ITERATIONS } else { iterations })?;
+            if !outcome.value.is_finite() {
+                break;
+            }
+        }
+        Ok(outcome)
+    }
+
+    /// One run of the optimizer; it is added to what has been spent.
+    fn run(&mut self, problem: &mut Problem<'_, D>, u: &mut Vec<f64>, iterations: usize) -> Result<Outcome> {
+        let cells = problem.cells();
         let limits = Limits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR };
         let mut energies = Vec::new();
         let outcome = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {

@@ -14,9 +14,9 @@ pub(super) trait Density: Copy {
         [0.5, 2.0 / 3.0]
     }
 
-    /// Weight over z̄, in m: the ground matters most, the torso's surroundings somewhat, the top hardly.
-    fn weight(&self, z: f64) -> f64 {
-        weight(z)
+    /// Weight over z̄, in m: the ground matters most, the torso's surroundings and all above them as much as `torso` says.
+    fn weight(&self, z: f64, torso: f64) -> f64 {
+        weight(z, torso)
     }
 
     /// Weight of the bottom face against the volume, m.
@@ -31,8 +31,8 @@ pub(super) trait Density: Copy {
 }
 
 /// The weight over z̄ of the energies that are to be small where the feet are.
-pub(super) fn weight(z: f64) -> f64 {
-    (-z / 0.25).exp() + 0.03
+pub(super) fn weight(z: f64, torso: f64) -> f64 {
+    (-z / 0.25).exp() + torso
 }
 
 /// The face weight of the same. At 0.7 the mean conformal error at the ground is a third larger, at torso height a thirtieth

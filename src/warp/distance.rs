@@ -57,10 +57,10 @@ impl Density for Distance {
     }
 
     /// Laplace's equation asks for an even weight.
-    fn weight(&self, z: f64) -> f64 {
+    fn weight(&self, z: f64, torso: f64) -> f64 {
         match self {
             Distance::Identity => 1.0,
-            _ => super::density::weight(z),
+            _ => super::density::weight(z, torso),
         }
     }
 

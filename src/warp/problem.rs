@@ -30,8 +30,17 @@ pub(super) struct Problem<'a, D> {
     bottom: Bottom,
     preconditioner: Preconditioner,
     misfit_weight: f64,
-    /// By how much the ground is lower than the terrain for now (bottom-face coefficients, m).
-    lowered: Vec<f64>,
+    /// How much of the terrain the ground is for now, and what the rest of it is (bottom-face coefficients, m).
+    share: f64,
+    base: Vec<f64>,
+}
+
+/// Where an energy is looked at, and what counts there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quadrature {
+    pub rule: Rule,
+    /// Weight of the energy well above the ground, of that at the ground (`MapSpec::torso_weight`).
+    pub torso_weight: f64,
 }
 
 impl<'a, D: Density> Problem<'a, D> {
@@ -39,9 +48,10 @@ impl<'a, D: Density> Problem<'a, D> {
     ///
     /// # Errors
     /// Internal ones of the preconditioner.
-    pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, rule: Rule) -> Result<Self> {
+    pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, points: Quadrature) -> Result<Self> {
         let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: map.cells()[d], cell: map.cell()[d] });
-        let assembly = Assembly::new(axes, rule, |z| density.weight(z), density.face_weight());
+        let weight = |z| density.weight(z, points.torso_weight);
+        let assembly = Assembly::new(axes, points.rule, weight, density.face_weight());
         let bottom = Bottom::new(&axes[0], &axes[1]);
         let [nx, ny, nz] = axes.map(|a| a.len());
         let free = [[1..nx - 1, 0..ny, 0..nz], [0..nx, 1..ny - 1, 0..nz], [0..nx, 0..ny, 1..nz]];
@@ -55,8 +65,14 @@ impl<'a, D: Density> Problem<'a, D> {
             bottom,
             preconditioner,
             misfit_weight: MISFIT_WEIGHT,
-            lowered: vec![0.0; nx * ny],
+            share: 1.0,
+            base: vec![0.0; nx * ny],
         })
+    }
+
+    /// Of the grid, along x, y, z.
+    pub fn cells(&self) -> [usize; 3] {
+        self.axes.map(|axis| axis.cells)
     }
 
     /// The coefficients of a map, on the grid of this problem.
@@ -64,23 +80,28 @@ impl<'a, D: Density> Problem<'a, D> {
         coefficients_of(map, &self.axes)
     }
 
-    /// How far the ground lies above the bottom face (bottom-face coefficients, m).
-    pub fn gap(&self, u: &[f64]) -> Vec<f64> {
-        let mut gap = self.ground(u).face;
-        for (g, v) in gap.iter_mut().zip(self.face(u, 2)) {
-            *g -= v;
-        }
-        gap
+    /// The heights of the bottom face (its coefficients, m).
+    pub fn bottom_face(&self, u: &[f64]) -> Vec<f64> {
+        self.face(u, 2)
     }
 
-    /// From here on, the ground is lower than the terrain by a share of `gap`.
-    pub fn lower_ground(&mut self, gap: &[f64], share: f64) {
-        self.lowered = gap.iter().map(|g| share * g).collect();
+    /// From here on, the ground is the terrain for a share, and `base` (bottom-face coefficients, m) for the rest.
+    pub fn grow_ground(&mut self, base: &[f64], share: f64) {
+        self.share = share;
+        self.base.copy_from_slice(base);
+    }
+
+    /// What a map with these coefficients costs, its misfit left out.
+    pub fn bending(&self, u: &[f64]) -> f64 {
+        self.assembly.energy(self.density, u, &mut vec![0.0; u.len()])
     }
 
     /// Moves the columns over the bottom face up or down, so that it lies on the ground.
     pub fn seat(&self, u: &mut [f64]) {
-        let gap = self.gap(u);
+        let mut gap = self.ground(u).face;
+        for (g, v) in gap.iter_mut().zip(self.face(u, 2)) {
+            *g -= v;
+        }
         let columns = u.len() / 3 * 2;
         for (column, gap) in u[columns..].chunks_exact_mut(self.axes[2].len()).zip(gap) {
             column.iter_mut().for_each(|v| *v += gap);
@@ -92,8 +113,7 @@ impl<'a, D: Density> Problem<'a, D> {
     pub fn forgive_misfit(&mut self, u: &[f64]) {
         let misfit = self.ground(u).misfit;
         let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
-        let energy = self.assembly.energy(self.density, u, &mut vec![0.0; u.len()]);
-        if misfit_energy > energy {
+        if misfit_energy > self.bending(u) {
             self.misfit_weight = 0.0;
         }
     }
@@ -220,15 +240,18 @@ impl<'a, D: Density> Problem<'a, D> {
     /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
     fn ground(&self, u: &[f64]) -> Ground {
         let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let (heights, slopes): (Vec<f64>, _) =
-            x.iter().zip(&y).map(|(x, y)| self.field.height_and_gradient(*x, *y)).unzip();
+        let at = |(x, y): (&f64, &f64)| {
+            let (height, slope) = self.field.height_and_gradient(*x, *y);
+            (self.share * height, slope.map(|s| self.share * s))
+        };
+        let (heights, slopes): (Vec<f64>, Vec<[f64; 2]>) = x.iter().zip(&y).map(at).unzip();
         let mut face = self.bottom.project(&heights);
         let mut misfit = self.bottom.values(&face);
         for (m, h) in misfit.iter_mut().zip(&heights) {
             *m -= h;
         }
-        for (f, lowered) in face.iter_mut().zip(&self.lowered) {
-            *f -= lowered;
+        for (f, base) in face.iter_mut().zip(&self.base) {
+            *f += (1.0 - self.share) * base;
         }
         Ground { slopes, face, misfit }
     }
@@ -307,6 +330,8 @@ mod tests {
     use super::*;
     use crate::scenario::{MapScale, MapSpec};
 
+    const POINTS: Quadrature = Quadrature { rule: Rule::Lobatto, torso_weight: 0.03 };
+
     fn field() -> Heightfield {
         Heightfield::from_function([-1.0, 1.0, -1.0, 1.5], 0.05, |x, y| Ok(0.2 * (2.0 * x + y).sin()))
             .unwrap()
@@ -329,7 +354,7 @@ mod tests {
     fn gradient_matches(density: impl Density) {
         let field = field();
         let map = map(&field);
-        let mut problem = Problem::new(&field, density, &map, Rule::Lobatto).unwrap();
+        let mut problem = Problem::new(&field, density, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
         let mut gradient = vec![0.0; u.len()];
         let mut unused = gradient.clone();
@@ -361,7 +386,7 @@ mod tests {
     fn the_gauss_newton_matrix_is_symmetric_and_positive() {
         let field = field();
         let map = map(&field);
-        let problem = Problem::new(&field, Barrier { scale: MapScale::Trace }, &map, Rule::Lobatto).unwrap();
+        let problem = Problem::new(&field, Barrier { scale: MapScale::Trace }, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
         problem.seat(&mut u);
         let linearized = problem.linearized(&u, |density, jacobian| density.curvature(jacobian, 0.0));
@@ -386,7 +411,7 @@ mod tests {
         let field = field();
         let map = map(&field);
         // The target of this energy is always 1, so that one round is all there is to do above the frozen ground.
-        let mut problem = Problem::new(&field, Distance::Identity, &map, Rule::Lobatto).unwrap();
+        let mut problem = Problem::new(&field, Distance::Identity, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
         let ground = problem.ground(&u).face;
         let mut scratch = [vec![0.0; u.len()], vec![0.0; u.len()]];
