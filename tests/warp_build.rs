@@ -79,9 +79,9 @@ fn a_medium_hill_is_met_to_a_millimetre() {
     check_map(&map, &field, 1e-3);
 }
 
-/// From the shear alone this one is twisted (18 % of conformal error at the ground) and folded.
+/// With the least weight above the ground this one folds at the top of the box.
 #[test]
-fn a_peak_of_slope_three_is_neither_twisted_nor_folded() {
+fn a_peak_of_slope_three_is_not_folded() {
     let field = hilly(3.0);
     let (map, report) = build(&field, &spec([24, 24, 8]), &mut go_on).unwrap();
     assert!(report.inverted_points == 0, "{report:?}");
@@ -139,7 +139,7 @@ fn progress_falls_and_may_stop_the_work() {
     })
     .unwrap();
     for pair in seen.windows(2) {
-        assert!(pair[1].iteration == 0 || pair[1].energy <= pair[0].energy);
+        assert!(pair[0].cells != pair[1].cells || pair[1].energy <= pair[0].energy);
     }
     let last = seen.last().unwrap();
     assert!(last.cells == [24, 24, 8] && last.decrement <= last.tolerance);

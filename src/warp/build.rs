@@ -42,10 +42,7 @@ const MAX_ITERATIONS: usize = 600;
 const MAX_COARSE_ITERATIONS: usize = 150;
 /// In how many steps ground is grown, and the iterations on each but the last.
 const GROWTH_STEPS: usize = 8;
-const GROWTH_ITERATIONS: usize = 60;
-/// On the coarsest grid, the map that was grown from flat ground is kept if its energy is less than this share of that of the one
-/// that started from the shear: over a peak of slope 3, the shear's is twisted, with twice the error at the ground.
-const WORTH_GROWING: f64 = 0.99;
+const GROWTH_ITERATIONS: usize = 30;
 /// What is tried in turn while the map is folded between its points, as happens at the top of the box over ground of slope 3: a
 /// greater weight of what is above the ground, by these factors, and at last more points a cell.
 const RETRIES: [(Rule, f64); 3] = [(Rule::Lobatto, 3.0), (Rule::Lobatto, 10.0), (Rule::Gauss, 10.0)];
@@ -53,7 +50,7 @@ const RETRIES: [(Rule, f64); 3] = [(Rule::Lobatto, 3.0), (Rule::Lobatto, 10.0), 
 const COARSEST: usize = 8;
 
 /// By how much cells are to be halved along x and y where the scenario does not give them: when the bottom misses the terrain by
-/// more than the first. Beyond the second the terrain has edges or peaks that cells half as large do not follow either, m.
+/// more than the first. Beyond the second the terrain has edges that cells half as large do not follow either, m.
 const WORTH_REFINING: std::ops::Range<f64> = 1e-3..1e-2;
 
 /// Finds the map over a terrain by the method of `spec`. F's box stands over the terrain's rectangle.
@@ -186,8 +183,8 @@ fn optimized<D: Density>(
         best = best.or_better(run.attempt(spec, points)?);
     }
     if worth_refining(spec, &best.report) {
-        let map = run.minimized(&best.map.refined([true, true, false]), best.points, MAX_ITERATIONS)?;
         let points = best.points;
+        let map = run.minimized(&best.map.refined([true, true, false]), points, MAX_ITERATIONS)?;
         best = best.or_better(run.measured(map, spec, points));
     }
     let Attempt { map, mut report, outcome, .. } = best;
@@ -256,31 +253,11 @@ impl<D: Density> Run<'_, D> {
             cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
             halvings.push(halve);
         }
-        let coarsest = MapSpec { cells: Some(cells), ..spec.clone() };
-        let mut map = WarpMap::shear(self.field, &coarsest)?;
+        let mut map = WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..spec.clone() })?;
         for halve in halvings.into_iter().rev() {
-            map = match map.cells() == cells {
-                true => self.coarsest(&map, &coarsest, points)?,
-                false => self.minimized(&map, points, MAX_COARSE_ITERATIONS)?,
-            }
-            .refined(halve);
+            map = self.minimized(&map, points, MAX_COARSE_ITERATIONS)?.refined(halve);
         }
         self.minimized(&map, points, MAX_ITERATIONS)
-    }
-
-    /// Like `minimized`, from the shear and from flat ground that grows: the better one.
-    fn coarsest(&mut self, shear: &WarpMap, spec: &MapSpec, points: Quadrature) -> Result<WarpMap> {
-        let sheared = self.minimized(shear, points, MAX_COARSE_ITERATIONS)?;
-        if self.density.may_fold() {
-            return Ok(sheared);
-        }
-        let flat = WarpMap::flat(self.field.extent(), spec)?;
-        let mut problem = Problem::new(self.field, self.density, &flat, points)?;
-        let mut u = problem.coefficients(&flat);
-        let grown = self.grown(&mut problem, &mut u, GROWTH_STEPS, MAX_COARSE_ITERATIONS)?;
-        let better = grown.value.is_finite()
-            && problem.bending(&u) < WORTH_GROWING * problem.bending(&problem.coefficients(&sheared));
-        Ok(if better { problem.to_map(&u, &flat) } else { sheared })
     }
 
     /// The minimizer on the grid of `start`, the map of a coarser grid.
@@ -294,7 +271,20 @@ impl<D: Density> Run<'_, D> {
         for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
             let mut problem = Problem::new(self.field, self.density, map, points)?;
             let mut u = problem.coefficients(map);
-            let outcome = self.grown(&mut problem, &mut u, steps, iterations)?;
+            let gap = problem.gap(&u);
+            let mut outcome = Outcome::default();
+            for step in 1..=steps {
+                problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
+                problem.seat(&mut u);
+                if iterations < MAX_ITERATIONS {
+                    problem.forgive_misfit(&u);
+                }
+                let iterations = if step < steps { GROWTH_ITERATIONS } else { iterations };
+                outcome = self.run(&mut problem, &mut u, cells, iterations)?;
+                if !outcome.value.is_finite() {
+                    break;
+                }
+            }
             if outcome.value.is_finite() {
                 self.outcome.converged = outcome.converged;
                 self.outcome.value = outcome.value;
@@ -305,34 +295,14 @@ impl<D: Density> Run<'_, D> {
         Err(Error::Internal("the shear onto the terrain is folded".into()))
     }
 
-    /// The minimizer, while the ground under the bottom face of u grows from where that is to the terrain; the outcome of the last
-    /// step, or of the first that folds, whose value is infinite.
-    fn grown(
+    /// One run of the optimizer; it is added to what has been spent.
+    fn run(
         &mut self,
         problem: &mut Problem<'_, D>,
         u: &mut Vec<f64>,
-        steps: usize,
+        cells: [usize; 3],
         iterations: usize,
     ) -> Result<Outcome> {
-        let base = problem.bottom_face(u);
-        let mut outcome = Outcome::default();
-        for step in 1..=steps {
-            problem.grow_ground(&base, step as f64 / steps as f64);
-            problem.seat(u);
-            if iterations < MAX_ITERATIONS {
-                problem.forgive_misfit(u);
-            }
-            outcome = self.run(problem, u, if step < steps { GROWTH_ITERATIONS } else { iterations })?;
-            if !outcome.value.is_finite() {
-                break;
-            }
-        }
-        Ok(outcome)
-    }
-
-    /// One run of the optimizer; it is added to what has been spent.
-    fn run(&mut self, problem: &mut Problem<'_, D>, u: &mut Vec<f64>, iterations: usize) -> Result<Outcome> {
-        let cells = problem.cells();
         let limits = Limits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR };
         let mut energies = Vec::new();
         let outcome = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {

@@ -30,9 +30,8 @@ pub(super) struct Problem<'a, D> {
     bottom: Bottom,
     preconditioner: Preconditioner,
     misfit_weight: f64,
-    /// How much of the terrain the ground is for now, and what the rest of it is (bottom-face coefficients, m).
-    share: f64,
-    base: Vec<f64>,
+    /// By how much the ground is lower than the terrain for now (bottom-face coefficients, m).
+    lowered: Vec<f64>,
 }
 
 /// Where an energy is looked at, and what counts there.
@@ -65,14 +64,8 @@ impl<'a, D: Density> Problem<'a, D> {
             bottom,
             preconditioner,
             misfit_weight: MISFIT_WEIGHT,
-            share: 1.0,
-            base: vec![0.0; nx * ny],
+            lowered: vec![0.0; nx * ny],
         })
-    }
-
-    /// Of the grid, along x, y, z.
-    pub fn cells(&self) -> [usize; 3] {
-        self.axes.map(|axis| axis.cells)
     }
 
     /// The coefficients of a map, on the grid of this problem.
@@ -80,28 +73,23 @@ impl<'a, D: Density> Problem<'a, D> {
         coefficients_of(map, &self.axes)
     }
 
-    /// The heights of the bottom face (its coefficients, m).
-    pub fn bottom_face(&self, u: &[f64]) -> Vec<f64> {
-        self.face(u, 2)
-    }
-
-    /// From here on, the ground is the terrain for a share, and `base` (bottom-face coefficients, m) for the rest.
-    pub fn grow_ground(&mut self, base: &[f64], share: f64) {
-        self.share = share;
-        self.base.copy_from_slice(base);
-    }
-
-    /// What a map with these coefficients costs, its misfit left out.
-    pub fn bending(&self, u: &[f64]) -> f64 {
-        self.assembly.energy(self.density, u, &mut vec![0.0; u.len()])
-    }
-
-    /// Moves the columns over the bottom face up or down, so that it lies on the ground.
-    pub fn seat(&self, u: &mut [f64]) {
+    /// How far the ground lies above the bottom face (bottom-face coefficients, m).
+    pub fn gap(&self, u: &[f64]) -> Vec<f64> {
         let mut gap = self.ground(u).face;
         for (g, v) in gap.iter_mut().zip(self.face(u, 2)) {
             *g -= v;
         }
+        gap
+    }
+
+    /// From here on, the ground is lower than the terrain by a share of `gap`.
+    pub fn lower_ground(&mut self, gap: &[f64], share: f64) {
+        self.lowered = gap.iter().map(|g| share * g).collect();
+    }
+
+    /// Moves the columns over the bottom face up or down, so that it lies on the ground.
+    pub fn seat(&self, u: &mut [f64]) {
+        let gap = self.gap(u);
         let columns = u.len() / 3 * 2;
         for (column, gap) in u[columns..].chunks_exact_mut(self.axes[2].len()).zip(gap) {
             column.iter_mut().for_each(|v| *v += gap);
@@ -113,7 +101,8 @@ impl<'a, D: Density> Problem<'a, D> {
     pub fn forgive_misfit(&mut self, u: &[f64]) {
         let misfit = self.ground(u).misfit;
         let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
-        if misfit_energy > self.bending(u) {
+        let energy = self.assembly.energy(self.density, u, &mut vec![0.0; u.len()]);
+        if misfit_energy > energy {
             self.misfit_weight = 0.0;
         }
     }
@@ -240,18 +229,15 @@ impl<'a, D: Density> Problem<'a, D> {
     /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
     fn ground(&self, u: &[f64]) -> Ground {
         let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
-        let at = |(x, y): (&f64, &f64)| {
-            let (height, slope) = self.field.height_and_gradient(*x, *y);
-            (self.share * height, slope.map(|s| self.share * s))
-        };
-        let (heights, slopes): (Vec<f64>, Vec<[f64; 2]>) = x.iter().zip(&y).map(at).unzip();
+        let (heights, slopes): (Vec<f64>, _) =
+            x.iter().zip(&y).map(|(x, y)| self.field.height_and_gradient(*x, *y)).unzip();
         let mut face = self.bottom.project(&heights);
         let mut misfit = self.bottom.values(&face);
         for (m, h) in misfit.iter_mut().zip(&heights) {
             *m -= h;
         }
-        for (f, base) in face.iter_mut().zip(&self.base) {
-            *f += (1.0 - self.share) * base;
+        for (f, lowered) in face.iter_mut().zip(&self.lowered) {
+            *f -= lowered;
         }
         Ground { slopes, face, misfit }
     }
