@@ -6,6 +6,8 @@ use super::ways::{RADIUS, Way, cells, is_steep, steeper, thinned, ways};
 
 /// Knot spacings of the base, in time steps.
 const KNOTS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
+/// … and the horizon for them, s: a multiple of all in time steps, so that knots lie on samples.
+const KNOTS_HORIZON: f64 = 9.6;
 /// Horizons of `speed`, s.
 const HORIZONS: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 
@@ -208,7 +210,7 @@ impl Protocol<'_> {
                             "medium",
                             formulation,
                             parameter,
-                            10.0,
+                            KNOTS_HORIZON,
                             &way,
                         ));
                     }
