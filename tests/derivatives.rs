@@ -197,6 +197,48 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
     }
 }
 
+/// Two threads say what one says, sums in another order apart, and the same bits each time.
+#[test]
+fn two_threads_evaluate_what_one_does() {
+    let durations = "[gait]\ncycle = 0.8\noptimize_durations = true\n";
+    for formulation in ["warped", "direct"] {
+        for (robot, gait) in [("anymal_towr", ""), ("anymal_c", ""), ("anymal_towr", durations)] {
+            let values = |threads: usize| {
+                let extra = format!("{gait}[solver]\nthreads = {threads}");
+                let mut problem = problem_of(robot, TERRAINS[4].1, formulation, &extra);
+                assert_eq!(problem.model.threads, threads);
+                let x: Vec<f64> =
+                    initial(&problem).iter().enumerate().map(|(v, x)| x + 0.01 * (v as f64).sin()).collect();
+                let multipliers: Vec<f64> =
+                    (0..problem.num_constraints()).map(|r| (1.3 * r as f64).cos()).collect();
+                let rows = [problem.jacobian_structure().0, problem.hessian_structure().unwrap().0]
+                    .map(<[i32]>::to_vec);
+                let mut evaluate = || {
+                    let mut values = [0, 1].map(|which| vec![f64::NAN; rows[which].len()]);
+                    problem.jacobian_values(&x, true, &mut values[0]);
+                    problem.hessian_values(&x, true, 0.7, &multipliers, true, &mut values[1]);
+                    values
+                };
+                let first = evaluate();
+                assert_eq!(first, evaluate(), "{robot}, {formulation}, {threads} threads");
+                (rows, first)
+            };
+            let (rows, one) = values(1);
+            let (same_rows, two) = values(2);
+            assert_eq!(rows, same_rows);
+            for (rows, (one, two)) in rows.iter().zip(one.iter().zip(&two)) {
+                let mut scale = vec![0.0_f64; 1 + *rows.last().unwrap() as usize];
+                rows.iter().zip(one).for_each(|(&r, v)| scale[r as usize] = scale[r as usize].max(v.abs()));
+                for ((&row, one), two) in rows.iter().zip(one).zip(two) {
+                    let error = (one - two).abs();
+                    let scale = scale[row as usize];
+                    assert!(error <= 1e-12 * scale, "{robot}, {formulation}, row {row}: {one} and {two}");
+                }
+            }
+        }
+    }
+}
+
 /// The check itself must see a wrong derivative: one entry of the Jacobian, or of the Hessian, off by a hundred thousandth.
 #[test]
 fn the_check_is_not_blind() {

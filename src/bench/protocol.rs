@@ -240,7 +240,7 @@ impl Protocol<'_> {
         cases
     }
 
-    /// The same way over the ripple, walked in more and more time.
+    /// The same way over the ripple, walked in more and more time, evaluated by one thread and by two.
     fn speed(&self) -> Vec<Case> {
         let horizons = if self.quick() { &HORIZONS[..2] } else { &HORIZONS[..] };
         let way = &ways("rippled")[3];
@@ -249,15 +249,14 @@ impl Protocol<'_> {
             for &horizon in horizons {
                 for formulation in &self.formulations() {
                     let parameter = Some(("horizon", horizon));
-                    cases.push(self.plan(
-                        Work::Speed,
-                        "rippled",
-                        level,
-                        formulation,
-                        parameter,
-                        horizon,
-                        way,
-                    ));
+                    let one = self.plan(Work::Speed, "rippled", level, formulation, parameter, horizon, way);
+                    let two = Case {
+                        name: format!("{}-2-threads", one.name),
+                        method: format!("{formulation}, 2 threads"),
+                        scenario: one.scenario.replace("[solver]\n", "[solver]\nthreads = 2\n"),
+                        ..one.clone()
+                    };
+                    cases.extend([one, two]);
                 }
             }
         }

@@ -6,7 +6,7 @@
 //!
 //! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` looks at every sample.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{Constraint, Place, height_form};
 use crate::heightfield::HeightJet;
@@ -84,19 +84,28 @@ impl Constraint for BaseClearance {
         curvature: &mut Curvature,
         sink: &mut Sink,
     ) {
-        for (&lambda, (k, b)) in multipliers.iter().zip(&self.places) {
-            let (base, node) = (&state.base[*k], &model.layout.base[*k]);
-            let (arm, ground, _, by_q) = point(model, base, b);
-            curvature.base_position[*k] += by_q * lambda;
-            curvature.base_rotation[*k] += by_q * b.transpose() * lambda;
-            let form = height_form(&ground) * -lambda;
+        let mut multipliers = multipliers.iter();
+        for points in self.places.chunk_by(|a, b| a.0 == b.0) {
+            let k = points[0].0;
+            let (base, node) = (&state.base[k], &model.layout.base[k]);
+            // All points of a sample depend on the same pose: their forms are summed first.
+            let [mut moves, mut both, mut turns] = [Matrix3::zeros(); 3];
+            for ((_, b), &lambda) in points.iter().zip(&mut multipliers) {
+                let (arm, ground, _, by_q) = point(model, base, b);
+                curvature.base_position[k] += by_q * lambda;
+                curvature.base_rotation[k] += by_q * b.transpose() * lambda;
+                let form = height_form(&ground) * -lambda;
+                // dq = dp − [R b] δ.
+                let by_turn = -cross_matrix(&arm);
+                moves += form;
+                both += form * by_turn;
+                turns += by_turn.transpose() * form * by_turn;
+            }
             let position = Tangent::position(model, &base.point, node);
             let turn = Tangent::turn(model, base, node);
-            // dq = dp − [R b] δ.
-            let by_turn = -cross_matrix(&arm);
-            position.quadratic(&form, sink);
-            position.cross(&(form * by_turn), &turn, sink);
-            turn.quadratic(&(by_turn.transpose() * form * by_turn), sink);
+            position.quadratic(&moves, sink);
+            position.cross(&both, &turn, sink);
+            turn.quadratic(&turns, sink);
         }
     }
 

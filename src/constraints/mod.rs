@@ -35,7 +35,7 @@ pub struct Place {
 }
 
 /// A named block of rows.
-pub trait Constraint {
+pub trait Constraint: Sync {
     /// Name, as users see it.
     fn name(&self) -> &'static str;
     /// Number of rows.

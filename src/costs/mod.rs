@@ -12,7 +12,7 @@ use crate::nlp::sink::Sink;
 use crate::nlp::{Model, State};
 
 /// A named term of the objective.
-pub trait Cost {
+pub trait Cost: Sync {
     /// Name, as users see it.
     fn name(&self) -> &'static str;
     /// Its value.

@@ -38,6 +38,9 @@ pub struct Curvature {
 }
 
 impl Curvature {
+    /// Number of parts of [`Self::say`].
+    pub const PARTS: usize = 3;
+
     /// All zero.
     pub fn new(state: &State) -> Self {
         let zeros = |v: &Vec<Vec<FootNode>>| v.iter().map(|f| vec![Vector3::zeros(); f.len()]).collect();
@@ -98,8 +101,42 @@ impl Curvature {
         *by_rotation += rotation;
     }
 
-    /// Says Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all constraints have added their weights.
-    pub fn say(&self, model: &Model, state: &State, sink: &mut Sink) {
+    /// Adds what other terms have added to another one.
+    pub fn merge(&mut self, other: &Self) {
+        fn sum<T: Copy + std::ops::AddAssign>(to: &mut [T], from: &[T]) {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+        }
+        sum(&mut self.base_position, &other.base_position);
+        sum(&mut self.base_rotation, &other.base_rotation);
+        for (to, from) in self.base_between.iter_mut().zip(&other.base_between) {
+            to.0 += from.0;
+            to.1 += from.1;
+        }
+        for (to, from) in [
+            (&mut self.contacts, &other.contacts),
+            (&mut self.swings, &other.swings),
+            (&mut self.swings_between, &other.swings_between),
+            (&mut self.points, &other.points),
+            (&mut self.forces, &other.forces),
+            (&mut self.full_forces, &other.full_forces),
+            (&mut self.warped_forces, &other.warped_forces),
+        ] {
+            to.iter_mut().zip(from).for_each(|(to, from)| sum(to, from));
+        }
+    }
+
+    /// Says part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
+    /// base, 1 what is due to switches, 2 the feet.
+    pub fn say(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
+        match part {
+            0 => self.say_bases(model, state, sink),
+            1 => self.say_switches(model, state, sink),
+            _ if model.space.is_warped() => self.say_feet(model, state, sink),
+            _ => {}
+        }
+    }
+
+    fn say_bases(&self, model: &Model, state: &State, sink: &mut Sink) {
         let layout = &model.layout;
         for (k, base) in state.base.iter().enumerate() {
             say_base(model, base, &layout.base[k], &self.base_position[k], &self.base_rotation[k], sink);
@@ -107,10 +144,6 @@ impl Curvature {
         for (k, base) in state.base_between.iter().enumerate() {
             let (position, rotation) = &self.base_between[k];
             say_base(model, base, &layout.base_between[k], position, rotation, sink);
-        }
-        self.say_switches(model, state, sink);
-        if model.space.is_warped() {
-            self.say_feet(model, state, sink);
         }
     }
 

@@ -13,6 +13,7 @@ pub mod derivatives;
 pub mod guess;
 pub mod model;
 pub mod problem;
+mod share;
 pub mod sink;
 pub mod solve;
 pub mod state;

@@ -53,6 +53,8 @@ pub struct Model {
     pub space: Space,
     /// The variables.
     pub layout: Layout,
+    /// Threads that evaluate derivatives, 1 or 2.
+    pub threads: usize,
 }
 
 /// The gait of a scenario, for a robot.
@@ -102,6 +104,7 @@ impl Model {
             underside,
             ground,
             space,
+            threads: scenario.solver.threads,
             layout: Layout::new(
                 &gait,
                 scenario.time_step,

@@ -27,6 +27,7 @@ use crate::trajectory::spline::SWING_CONTROL_POINTS;
 
 use super::curvature::Curvature;
 use super::model::Model;
+use super::share::Share;
 use super::sink::{Pattern, Sink};
 use super::state::State;
 
@@ -50,9 +51,9 @@ pub struct Problem {
     offsets: Vec<usize>,
     costs: Vec<Box<dyn Cost>>,
     jacobian: Pattern,
+    jacobian_share: Share,
     gradient: Pattern,
-    hessian: Option<Pattern>,
-    curvature: Curvature,
+    hessian: Option<Hessian>,
     gradient_values: Vec<f64>,
     /// The last x, and whether the second derivatives of the nodes are there.
     evaluated: Vec<f64>,
@@ -132,32 +133,24 @@ impl Problem {
         }
         let mut state = State::new(&model);
         state.update(&model, &initial, exact_hessian);
-        let jacobian = Pattern::record(|sink| {
-            for (block, &first) in blocks.iter().zip(&offsets) {
-                block.jacobian(&model, &state, first, sink);
-            }
+        let jacobian = Pattern::record_parts(blocks.len(), |part, sink| {
+            blocks[part].jacobian(&model, &state, offsets[part], sink);
         });
         let gradient = Pattern::record(|sink| {
             for cost in &costs {
                 cost.gradient(&model, &state, &initial, sink);
             }
         });
-        let mut curvature = Curvature::new(&state);
         let hessian = exact_hessian.then(|| {
-            let multipliers = vec![1.0; offsets[blocks.len()]];
-            Pattern::record(|sink| {
-                say_hessian(
-                    &model,
-                    &state,
-                    &blocks,
-                    &offsets,
-                    &costs,
-                    &initial,
-                    1.0,
-                    &multipliers,
-                    &mut curvature,
-                    sink,
-                );
+            Hessian::new(&Terms {
+                model: &model,
+                state: &state,
+                blocks: &blocks,
+                offsets: &offsets,
+                costs: &costs,
+                x: &initial,
+                factor: 1.0,
+                multipliers: &vec![1.0; offsets[blocks.len()]],
             })
         });
         let (lower, upper) = variable_bounds(&model, &initial);
@@ -165,6 +158,7 @@ impl Problem {
             gradient_values: vec![0.0; gradient.len()],
             evaluated: initial.clone(),
             curved: exact_hessian,
+            jacobian_share: Share::new(&jacobian, 0..blocks.len(), model.threads),
             model,
             state,
             blocks,
@@ -173,7 +167,6 @@ impl Problem {
             jacobian,
             gradient,
             hessian,
-            curvature,
             initial,
             lower,
             upper,
@@ -260,27 +253,79 @@ fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (lower, upper)
 }
 
-#[allow(clippy::too_many_arguments)] // the parts of one problem, borrowed apart
-fn say_hessian(
-    model: &Model,
-    state: &State,
-    blocks: &[Box<dyn Constraint>],
-    offsets: &[usize],
-    costs: &[Box<dyn Cost>],
-    x: &[f64],
+/// The terms of the Lagrangian: the blocks' rows times their multipliers, then the costs times a factor.
+struct Terms<'a> {
+    model: &'a Model,
+    state: &'a State,
+    blocks: &'a [Box<dyn Constraint>],
+    offsets: &'a [usize],
+    costs: &'a [Box<dyn Cost>],
+    x: &'a [f64],
     factor: f64,
-    multipliers: &[f64],
-    curvature: &mut Curvature,
-    sink: &mut Sink,
-) {
-    curvature.clear();
-    for (block, &first) in blocks.iter().zip(offsets) {
-        block.hessian(model, state, &multipliers[first..first + block.rows()], curvature, sink);
+    multipliers: &'a [f64],
+}
+
+impl Terms<'_> {
+    fn hessian(&self, term: usize, curvature: &mut Curvature, sink: &mut Sink) {
+        let Self { model, state, .. } = self;
+        match self.blocks.get(term) {
+            Some(block) => {
+                let multipliers = &self.multipliers[self.offsets[term]..self.offsets[term + 1]];
+                block.hessian(model, state, multipliers, curvature, sink);
+            }
+            None => {
+                let cost = &self.costs[term - self.blocks.len()];
+                cost.hessian(model, state, self.x, self.factor, curvature, sink);
+            }
+        }
     }
-    for cost in costs {
-        cost.hessian(model, state, x, factor, curvature, sink);
+}
+
+/// The Hessian of the Lagrangian and how it is shared: first all terms, each thread with a sum of its own of the nodes' weights,
+/// then, as further parts of the pattern, the nodes.
+struct Hessian {
+    pattern: Pattern,
+    terms: Share,
+    nodes: Share,
+    curvatures: [Curvature; 2],
+}
+
+impl Hessian {
+    fn new(all: &Terms) -> Self {
+        let mut curvature = Curvature::new(all.state);
+        let terms = all.blocks.len() + all.costs.len();
+        let parts = terms + Curvature::PARTS;
+        let pattern = Pattern::record_parts(parts, |part, sink| match part.checked_sub(terms) {
+            None => all.hessian(part, &mut curvature, sink),
+            Some(node) => curvature.say(node, all.model, all.state, sink),
+        });
+        let threads = all.model.threads;
+        Self {
+            terms: Share::new(&pattern, 0..terms, threads),
+            nodes: Share::new(&pattern, terms..parts, threads),
+            pattern,
+            curvatures: [curvature.clone(), curvature],
+        }
     }
-    curvature.say(model, state, sink);
+
+    fn values(&mut self, all: &Terms, out: &mut [f64]) {
+        let Self { pattern, terms, nodes, curvatures: [here, there] } = self;
+        out.fill(0.0);
+        here.clear();
+        there.clear();
+        terms.add(
+            pattern,
+            out,
+            |term, sink| all.hessian(term, here, sink),
+            |term, sink| all.hessian(term, there, sink),
+        );
+        if all.model.threads > 1 {
+            here.merge(there);
+        }
+        let first = all.blocks.len() + all.costs.len();
+        let say = |part: usize, sink: &mut Sink| here.say(part - first, all.model, all.state, sink);
+        nodes.add(pattern, out, say, say);
+    }
 }
 
 impl NlpProblem for Problem {
@@ -341,15 +386,13 @@ impl NlpProblem for Problem {
     fn jacobian_values(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
         self.update(x, false);
         let (model, state, blocks, offsets) = (&self.model, &self.state, &self.blocks, &self.offsets);
-        self.jacobian.fill(out, |sink| {
-            for (block, &first) in blocks.iter().zip(offsets) {
-                block.jacobian(model, state, first, sink);
-            }
-        });
+        let say = |part: usize, sink: &mut Sink| blocks[part].jacobian(model, state, offsets[part], sink);
+        out.fill(0.0);
+        self.jacobian_share.add(&self.jacobian, out, say, say);
     }
 
     fn hessian_structure(&self) -> Option<(&[i32], &[i32])> {
-        self.hessian.as_ref().map(|h| (&h.rows[..], &h.columns[..]))
+        self.hessian.as_ref().map(|h| (&h.pattern.rows[..], &h.pattern.columns[..]))
     }
 
     fn hessian_values(
@@ -362,23 +405,18 @@ impl NlpProblem for Problem {
         out: &mut [f64],
     ) {
         self.update(x, true);
-        let (model, state, blocks, offsets) = (&self.model, &self.state, &self.blocks, &self.offsets);
-        let (costs, curvature) = (&self.costs, &mut self.curvature);
-        if let Some(hessian) = &self.hessian {
-            hessian.fill(out, |sink| {
-                say_hessian(
-                    model,
-                    state,
-                    blocks,
-                    offsets,
-                    costs,
-                    x,
-                    objective_factor,
-                    multipliers,
-                    curvature,
-                    sink,
-                );
-            });
+        if let Some(hessian) = &mut self.hessian {
+            let terms = Terms {
+                model: &self.model,
+                state: &self.state,
+                blocks: &self.blocks,
+                offsets: &self.offsets,
+                costs: &self.costs,
+                x,
+                factor: objective_factor,
+                multipliers,
+            };
+            hessian.values(&terms, out);
         }
     }
 }

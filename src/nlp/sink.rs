@@ -2,7 +2,7 @@
 //!
 //! A block says each derivative once, as (row, variable, value). The first time the places are recorded and become the
 //! sparsity pattern; ever after the same calls, in the same order, add their values to the stored slots. So the
-//! pattern and the values cannot drift apart.
+//! pattern and the values cannot drift apart. What is said consists of parts, each of which can be said again alone.
 
 use crate::trajectory::LinearNode;
 
@@ -14,14 +14,26 @@ pub struct Pattern {
     /// Column of each slot.
     pub columns: Vec<i32>,
     slots: Vec<u32>,
+    /// Where in `slots` each part starts, and where the last one ends.
+    starts: Vec<usize>,
 }
 
 impl Pattern {
-    /// Records what `say` says into a sink.
+    /// Records what `say` says into a sink, in one part.
     pub fn record(say: impl FnOnce(&mut Sink)) -> Self {
+        let mut say = Some(say);
+        Self::record_parts(1, |_, sink| say.take().into_iter().for_each(|say| say(sink)))
+    }
+
+    /// Records what `say` says into a sink for each number of a part.
+    pub fn record_parts(parts: usize, mut say: impl FnMut(usize, &mut Sink)) -> Self {
         let mut sink = Sink { places: Vec::new(), slots: &[], cursor: 0, values: &mut [] };
-        say(&mut sink);
-        Self::of(&sink.places)
+        let mut starts = vec![0];
+        for part in 0..parts {
+            say(part, &mut sink);
+            starts.push(sink.places.len());
+        }
+        Self { starts, ..Self::of(&sink.places) }
     }
 
     /// Row by row, for places number a hundred to a slot: sorting them all took a tenth of a solve.
@@ -73,12 +85,29 @@ impl Pattern {
         self.rows.is_empty()
     }
 
+    /// Number of entries that a part says.
+    pub fn said(&self, part: usize) -> usize {
+        self.starts[part + 1] - self.starts[part]
+    }
+
     /// Fills `values`, one for each slot, with what `say` says this time.
     pub fn fill(&self, values: &mut [f64], say: impl FnOnce(&mut Sink)) {
         values.fill(0.0);
-        let mut sink = Sink { places: Vec::new(), slots: &self.slots, cursor: 0, values };
+        self.replay(&self.slots, values, say);
+    }
+
+    /// Adds what `say` says this time for some of the parts to `values`, one for each slot.
+    pub fn add(&self, parts: &[usize], values: &mut [f64], mut say: impl FnMut(usize, &mut Sink)) {
+        for &part in parts {
+            let slots = &self.slots[self.starts[part]..self.starts[part + 1]];
+            self.replay(slots, values, |sink| say(part, sink));
+        }
+    }
+
+    fn replay(&self, slots: &[u32], values: &mut [f64], say: impl FnOnce(&mut Sink)) {
+        let mut sink = Sink { places: Vec::new(), slots, cursor: 0, values };
         say(&mut sink);
-        assert_eq!(sink.cursor, self.slots.len(), "a block said other places than it had declared");
+        assert_eq!(sink.cursor, slots.len(), "a block said other places than it had declared");
     }
 }
 
@@ -102,36 +131,68 @@ impl Sink<'_> {
         }
     }
 
+    /// The slots of the next `count` entries, and the values; none while places are recorded.
+    #[inline]
+    fn next(&mut self, count: usize) -> Option<(std::slice::Iter<'_, u32>, &mut [f64])> {
+        if self.values.is_empty() {
+            return None;
+        }
+        let slots = &self.slots[self.cursor..self.cursor + count];
+        self.cursor += count;
+        Some((slots.iter(), self.values))
+    }
+
     /// Adds the derivative `value` of a row with respect to component `d` of a node.
     #[inline]
     pub fn node(&mut self, row: usize, node: &LinearNode, d: usize, value: f64) {
-        node.differential(d).for_each(|(variable, weight)| self.add(row, variable, weight * value));
+        let differential = node.differential(d);
+        match self.next(differential.len()) {
+            Some((slots, values)) => {
+                for ((_, weight), &slot) in differential.zip(slots) {
+                    values[slot as usize] += weight * value;
+                }
+            }
+            None => differential.for_each(|(variable, _)| self.add(row, variable, 0.0)),
+        }
     }
 
     /// Adds the second derivative `value` with respect to component `a` of one node and component `b` of another *and* its
     /// mirror image, to the lower triangle. For the two halves of one node's own block say each unordered pair once.
     #[inline]
     pub fn pair(&mut self, (node_a, a): (&LinearNode, usize), (node_b, b): (&LinearNode, usize), value: f64) {
-        node_a.differential(a).for_each(|(u, weight_a)| {
-            node_b.differential(b).for_each(|(v, weight_b)| {
-                let value = weight_a * weight_b * value;
-                self.add(u.max(v), u.min(v), if u == v { 2.0 * value } else { value });
-            });
-        });
+        let (left, right) = (node_a.differential(a), || node_b.differential(b));
+        match self.next(left.len() * right().len()) {
+            Some((mut slots, values)) => {
+                for (u, weight_a) in left {
+                    for ((v, weight_b), &slot) in right().zip(&mut slots) {
+                        let value = weight_a * weight_b * value;
+                        values[slot as usize] += if u == v { 2.0 * value } else { value };
+                    }
+                }
+            }
+            None => left.for_each(|(u, _)| right().for_each(|(v, _)| self.add(u.max(v), u.min(v), 0.0))),
+        }
     }
 
     /// Adds the second derivative `value` with respect to components `a` and `b` of one and the same node, a ≥ b, once for
     /// each unordered pair (a, b), to the lower triangle.
     #[inline]
     pub fn own(&mut self, node: &LinearNode, a: usize, b: usize, value: f64) {
-        if a == b {
-            node.differential(a).enumerate().for_each(|(s, (u, weight_s))| {
-                node.differential(a).take(s + 1).for_each(|(v, weight_t)| {
-                    self.add(u.max(v), u.min(v), weight_s * weight_t * value);
-                });
-            });
-        } else {
-            self.pair((node, a), (node, b), value);
+        if a != b {
+            return self.pair((node, a), (node, b), value);
+        }
+        let all = || node.differential(a);
+        match self.next(all().len() * (all().len() + 1) / 2) {
+            Some((mut slots, values)) => {
+                for (s, (_, weight_s)) in all().enumerate() {
+                    for ((_, weight_t), &slot) in all().take(s + 1).zip(&mut slots) {
+                        values[slot as usize] += weight_s * weight_t * value;
+                    }
+                }
+            }
+            None => all().enumerate().for_each(|(s, (u, _))| {
+                all().take(s + 1).for_each(|(v, _)| self.add(u.max(v), u.min(v), 0.0));
+            }),
         }
     }
 }

@@ -530,6 +530,9 @@ pub struct SolverSpec {
     pub hessian_memory: usize,
     /// How far to go.
     pub effort: Effort,
+    /// Threads that evaluate the derivatives of the NLP; the linear solver keeps to one.
+    #[schemars(range(min = 1, max = 2))]
+    pub threads: usize,
 }
 
 impl Default for SolverSpec {
@@ -541,6 +544,7 @@ impl Default for SolverSpec {
             hessian: None,
             hessian_memory: 6,
             effort: Effort::Smooth,
+            threads: 1,
         }
     }
 }

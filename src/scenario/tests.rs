@@ -137,6 +137,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
                 "\"auto\", \"off\", or an integer from 1 to 100",
             ],
         ),
+        (
+            with("horizon = 10", "horizon = 10\n[solver]\nthreads = 3"),
+            vec!["s.toml:4: solver.threads: given 3, allowed: an integer from 1 to 2"],
+        ),
         (with("horizon = 10", "horizon = 0.1"), vec!["time_step: given 0.05, which makes 2.0 steps"]),
         (with("horizon = 10", "horizon = = 10"), vec!["s.toml:2: not TOML", "horizon = = 10"]),
         (with("horizon = 10", "horizon = 10\nhorizon = 11"), vec!["s.toml:3: not TOML", "duplicate"]),

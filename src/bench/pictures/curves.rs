@@ -156,8 +156,9 @@ fn curve(svg: &mut Svg, [x, y]: [f64; 2], terrain: &str, name: &str, groups: &[&
 pub(super) fn speed(rows: &[&Row]) -> String {
     let mut svg = Svg::new(1240.0, 480.0);
     heading(&mut svg, "Cost against the length of the motion");
-    let (warped, direct) = (style("warped", ""), style("direct", ""));
-    legend(&mut svg, [70.0, 62.0], &[("warped", &warped), ("direct", &direct)]);
+    let methods = ["warped", "warped, 2 threads", "direct", "direct, 2 threads"];
+    let styles = methods.map(|method| style(method, ""));
+    legend(&mut svg, [70.0, 62.0], &[0, 1, 2, 3].map(|n| (methods[n], styles[n].as_str())));
     let by_iteration = |seconds: f64, m: &MotionMeasured| 1e3 * seconds / m.iterations.max(1) as f64;
     let cpu = |row: &Row| row.outcome.as_ref().ok().map(|measured| measured.cpu.solve);
     let linear = |row: &Row| motion(row).map(|m| by_iteration(m.seconds.linear_solver, m));

@@ -51,7 +51,13 @@ fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 
 /// Colours of the formulations.
 fn colour(method: &str) -> &'static str {
-    if method == FORMULATIONS[0] { "#2166ac" } else { "#c8352c" }
+    // With two threads of evaluation paler.
+    match (method.starts_with(FORMULATIONS[0]), method.ends_with(", 2 threads")) {
+        (true, false) => "#2166ac",
+        (true, true) => "#92c5de",
+        (false, false) => "#c8352c",
+        (false, true) => "#f4a582",
+    }
 }
 
 fn motion(row: &Row) -> Option<&MotionMeasured> {
