@@ -100,6 +100,14 @@ fn more_weight_at_the_torso_makes_the_map_gentler_there() {
 }
 
 #[test]
+fn cells_are_about_square_over_oblong_ground() {
+    let cells = |extent| MapSpec::default().cells(extent);
+    assert_eq!(cells([-3.0, 3.0, -3.0, 3.0]), [48, 48, 16]);
+    assert_eq!(cells([0.0, 2.0, 0.0, 16.0]), [16, 136, 16]);
+    assert_eq!(cells([0.0, 1000.0, 0.0, 1.0]), [288, 8, 16]);
+}
+
+#[test]
 fn flat_ground_needs_no_warp() {
     let field = terrain(|_, _| 0.2);
     let (map, report) = build(&field, &spec([16, 12, 8]), &mut go_on).unwrap();

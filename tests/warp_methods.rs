@@ -181,7 +181,7 @@ fn cells_that_are_not_given_are_made_finer_where_the_bottom_misses() {
     // A bump that 48 cells follow to some millimetres only.
     let field = terrain(|x, y| 0.35 * (-(x * x + y * y) / 0.05).exp());
     let open = MapSpec { method: MapMethod::Shear, ..MapSpec::default() };
-    let (_, given) = made(&field, &MapSpec { cells: Some(open.cells()), ..open.clone() });
+    let (_, given) = made(&field, &MapSpec { cells: Some(open.cells(field.extent())), ..open.clone() });
     assert!(given.cells == [48, 48, 16] && given.misfit_max > 1e-3, "{}", given.misfit_max);
     let (_, finer) = made(&field, &open);
     assert_eq!(finer.cells, [96, 96, 16]);

@@ -436,7 +436,8 @@ pub struct MapSpec {
     pub method: MapMethod,
     /// acap-local-global, acap-newton: the scale.
     pub scale: MapScale,
-    /// Cells along x, y, z; default: 48, 48, 16, and twice as many along x and y where the terrain bends too much for them.
+    /// Cells along x, y, z; default: 48, 48, 16 over a square, over an oblong about as many and about square, and twice as many
+    /// along x and y where the terrain bends too much for them.
     #[schemars(inner(range(min = 4, max = 512)))]
     pub cells: Option<[usize; 3]>,
     /// Height of the box, m.
@@ -461,9 +462,12 @@ impl Default for MapSpec {
 }
 
 impl MapSpec {
-    /// The cells to begin with.
-    pub fn cells(&self) -> [usize; 3] {
-        self.cells.unwrap_or([48, 48, 16])
+    /// The cells to begin with over a rectangle (x_min, x_max, y_min, y_max), m.
+    pub fn cells(&self, [x_min, x_max, y_min, y_max]: [f64; 4]) -> [usize; 3] {
+        let oblong = ((x_max - x_min) / (y_max - y_min)).sqrt().clamp(1.0 / 6.0, 6.0);
+        // Multiples of 8, so that there are coarser grids to start from.
+        let along = |share: f64| 8 * (6.0 * share).round() as usize;
+        self.cells.unwrap_or([along(oblong), along(1.0 / oblong), 16])
     }
 }
 

@@ -243,7 +243,7 @@ impl<D: Density> Run<'_, D> {
     }
 
     fn coarse_to_fine(&mut self, spec: &MapSpec, points: Quadrature) -> Result<WarpMap> {
-        let mut cells = spec.cells();
+        let mut cells = spec.cells(self.field.extent());
         let mut halvings = Vec::new();
         loop {
             let halve = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);

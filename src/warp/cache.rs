@@ -16,7 +16,7 @@ use crate::scenario::MapSpec;
 use crate::{Error, Result};
 
 /// To be raised with every change that makes a different map of the same terrain.
-const SOLVER_VERSION: u32 = 4;
+const SOLVER_VERSION: u32 = 5;
 
 #[derive(Serialize, Deserialize)]
 struct Header {

@@ -277,7 +277,7 @@ fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3]
             size[0], size[1], size[2]
         )));
     }
-    let grid = spec.cells();
+    let grid = spec.cells(extent);
     if let Some(n) = grid.iter().find(|n| !(4..=512).contains(*n)) {
         return Err(Error::input(format!("map.cells = {:?}: {n} is not between 4 and 512", grid)));
     }
