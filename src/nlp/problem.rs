@@ -312,7 +312,9 @@ impl Hessian {
         let Self { pattern, terms, nodes, curvatures: [here, there] } = self;
         out.fill(0.0);
         here.clear();
-        there.clear();
+        if all.model.threads > 1 {
+            there.clear();
+        }
         terms.add(
             pattern,
             out,

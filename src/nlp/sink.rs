@@ -20,9 +20,8 @@ pub struct Pattern {
 
 impl Pattern {
     /// Records what `say` says into a sink, in one part.
-    pub fn record(say: impl FnOnce(&mut Sink)) -> Self {
-        let mut say = Some(say);
-        Self::record_parts(1, |_, sink| say.take().into_iter().for_each(|say| say(sink)))
+    pub fn record(mut say: impl FnMut(&mut Sink)) -> Self {
+        Self::record_parts(1, |_, sink| say(sink))
     }
 
     /// Records what `say` says into a sink for each number of a part.
