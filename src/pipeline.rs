@@ -1,49 +1,75 @@
-//! From a scenario to a checked plan: terrain → map → NLP → plan → check. What `warpgait solve` and Python's
-//! `warpgait.solve` both do.
+//! From a scenario to a checked plan: terrain → map → NLP → plan → check. `warpgait solve`, `warpgait bench` and Python's
+//! `warpgait.solve` all run this.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use sha2::{Digest, Sha256};
-
 use crate::check::{CheckReport, check};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
-use crate::nlp::derivatives::{self, DerivativeError};
-use crate::nlp::model::gait;
-use crate::nlp::solve::{self as nlp, Motion};
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
+use crate::planner::derivatives::{self, DerivativeError};
+use crate::planner::{self, GaitProblem, Host, Motion, Progress, Task};
 use crate::robot::Robot;
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
-use crate::terrain::{self, Ground, GroundReport};
+use crate::terrain::{self, Ground};
+use crate::trajectory::Gait;
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
-use crate::{Error, Result};
+use crate::{Error, Result, digest};
 
-/// So many variables are moved in a check of the derivatives.
+/// How many variables a check of the derivatives perturbs.
 const DERIVATIVE_VARIABLES: usize = 200;
 
-/// What is going on, for people who wait.
+/// A step of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Reading robot and terrain.
+    Terrain,
+    /// Building the map, or reading it from the cache.
+    Map,
+    /// Comparing derivatives with differences.
+    Derivatives,
+    /// Solving the NLP.
+    Solve,
+    /// Sampling and checking the plan.
+    Plan,
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Terrain => "terrain",
+            Self::Map => "map",
+            Self::Derivatives => "derivatives",
+            Self::Solve => "solve",
+            Self::Plan => "plan",
+        })
+    }
+}
+
+/// Progress, for people who wait.
 #[derive(Clone, Debug)]
 pub enum Event<'a> {
-    /// A stage begins that tells nothing more.
-    Stage(&'a str),
-    /// Something worth keeping.
+    /// A step begins.
+    Step(Step),
+    /// A remark that stays on the screen.
     Note(&'a str),
     /// An iteration of the map.
     Map(MapProgress),
     /// An iteration of the NLP.
-    Iteration(nlp::Progress<'a>),
+    Iteration(Progress<'a>),
 }
 
-/// Called at every event; may ask to stop, which is heard at the iterations.
+/// Called at every event; may ask to stop, which takes effect at the next iteration.
 pub type Observer<'a> = dyn FnMut(&Event) -> ControlFlow<()> + 'a;
 
 /// A map and how it came about.
-pub struct Built {
+pub struct BuiltMap {
     /// φ
     pub map: WarpMap,
     /// Its quality.
@@ -52,19 +78,69 @@ pub struct Built {
     pub cached: bool,
 }
 
+impl BuiltMap {
+    /// Reports what a user should know about the map.
+    pub fn report_warnings(&self, observer: &mut Observer) {
+        for warning in &self.report.warnings {
+            let _ = observer(&Event::Note(&format!("map: {warning}")));
+        }
+    }
+}
+
+/// All that is read before anything is computed.
+pub struct Prepared {
+    /// The robot.
+    pub robot: Robot,
+    /// Its gait.
+    pub gait: Gait,
+    /// The ground and how it came about.
+    pub ground: Ground,
+    /// The ground's surface, shared by all models.
+    pub surface: Arc<Heightfield>,
+    /// File name → SHA-256.
+    pub inputs: BTreeMap<String, String>,
+}
+
+impl Prepared {
+    /// Reads robot and terrain and refuses what does not fit together.
+    ///
+    /// # Errors
+    /// For input that is wrong or files that cannot be read.
+    pub fn new(loaded: &LoadedScenario, observer: &mut Observer) -> Result<Self> {
+        // A request to stop takes effect at the first iteration.
+        let _ = observer(&Event::Step(Step::Terrain));
+        let scenario = &loaded.scenario;
+        let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
+        let gait = Gait::of(scenario, &robot)?;
+        let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
+        loaded.ensure_inside(ground.field.extent())?;
+        for note in &ground.report.notes {
+            let _ = observer(&Event::Note(&format!("terrain: {note}")));
+        }
+        let inputs = inputs(loaded, &mut ground)?;
+        let surface = Arc::new(ground.field.clone());
+        Ok(Self { robot, gait, ground, surface, inputs })
+    }
+
+    /// What the planner is given.
+    pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
+        Task { scenario: &loaded.scenario, robot: &self.robot, gait: &self.gait, ground: &self.surface, map }
+    }
+}
+
 /// All that came out of a scenario.
-pub struct Outcome {
-    /// The plan, with what the check said.
+pub struct Planned {
+    /// What it was planned from.
+    pub prepared: Prepared,
+    /// The map, in the warped formulation.
+    pub map: Option<BuiltMap>,
+    /// The plan, with the results of the check.
     pub plan: Plan,
     /// What it was sampled from.
     pub motion: Motion,
     /// The check in full.
     pub check: CheckReport,
-    /// How the terrain came about.
-    pub ground: GroundReport,
-    /// The map, in the warped formulation.
-    pub map: Option<Built>,
-    /// Derivatives against differences, when asked for.
+    /// Derivatives against differences, when requested.
     pub derivatives: Option<Vec<DerivativeError>>,
 }
 
@@ -76,56 +152,65 @@ pub fn run(
     loaded: &LoadedScenario,
     check_derivatives: bool,
     observer: &mut Observer,
-) -> Result<Option<Outcome>> {
+) -> Result<Option<Planned>> {
     let scenario = &loaded.scenario;
-    let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
-    phases_match(loaded, &robot)?;
-    nlp::validate(scenario)?;
-    // Refused now and not after the map.
-    gait(scenario, &robot)?;
+    let prepared = Prepared::new(loaded, observer)?;
 
-    // Whoever wishes to stop is asked again at the first iteration.
-    let _ = observer(&Event::Stage("terrain"));
-    let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
-    loaded.ensure_inside(ground.field.extent())?;
-    for note in &ground.report.notes {
-        let _ = observer(&Event::Note(&format!("terrain: {note}")));
-    }
-    let inputs = inputs(loaded, &mut ground)?;
-
+    let _ = observer(&Event::Step(Step::Map));
     let start = Instant::now();
     let map = match scenario.formulation {
         Formulation::Direct => None,
-        Formulation::Warped => match build_map(&ground.field, &scenario.map, true, observer)? {
+        Formulation::Warped => match build_map(&prepared.surface, &scenario.map, true, observer)? {
             Some(built) => {
                 built.report.ensure_injective()?;
-                built.tell(observer);
+                built.report_warnings(observer);
                 Some(built)
             }
             None => return Ok(None),
         },
     };
     let map_seconds = start.elapsed().as_secs_f64();
-    let warp = map.as_ref().map(|built| &built.map);
-    let field = Arc::new(ground.field.clone());
+    let task = prepared.task(loaded, map.as_ref().map(|built| &built.map));
 
     let derivatives = match check_derivatives {
         true => {
-            let _ = observer(&Event::Stage("derivatives"));
-            let mut problem = nlp::problem(scenario, &robot, &field, warp)?;
-            Some(compare_derivatives(&mut problem))
+            let _ = observer(&Event::Step(Step::Derivatives));
+            Some(compare_derivatives(&mut task.problem()?))
         }
         false => None,
     };
-    let motion =
-        nlp::solve(scenario, &robot, &field, warp, &mut |at| observer(&Event::Iteration(at.clone())))?;
-    let _ = observer(&Event::Stage("plan"));
-    let text = &loaded.text;
-    let provenance = Provenance { scenario, text, robot: &robot, ground: &ground, inputs, map_seconds };
+    let _ = observer(&Event::Step(Step::Solve));
+    let motion = planner::solve(&task, &mut Planning { spec: &scenario.map, observer: &mut *observer })?;
+
+    let _ = observer(&Event::Step(Step::Plan));
+    let provenance = Provenance {
+        scenario,
+        text: &loaded.text,
+        robot: &prepared.robot,
+        ground: &prepared.ground,
+        inputs: prepared.inputs.clone(),
+        map_seconds,
+    };
     let mut plan = Plan::from_motion(&motion, &provenance);
     let check = check(&plan)?;
     plan.meta.checks = check.rows.clone();
-    Ok(Some(Outcome { plan, motion, check, ground: ground.report, map, derivatives }))
+    Ok(Some(Planned { prepared, map, plan, motion, check, derivatives }))
+}
+
+/// What the planner asks for while it solves.
+struct Planning<'a, 'b> {
+    spec: &'a MapSpec,
+    observer: &'a mut Observer<'b>,
+}
+
+impl Host for Planning<'_, '_> {
+    fn on_iteration(&mut self, progress: &Progress) -> ControlFlow<()> {
+        (self.observer)(&Event::Iteration(progress.clone()))
+    }
+
+    fn build_map(&mut self, ground: &Heightfield) -> Result<Option<WarpMap>> {
+        Ok(build_map(ground, self.spec, true, self.observer)?.map(|built| built.map))
+    }
 }
 
 /// Builds the map, or takes it from the cache; none when it was stopped.
@@ -137,7 +222,7 @@ pub fn build_map(
     spec: &MapSpec,
     with_cache: bool,
     observer: &mut Observer,
-) -> Result<Option<Built>> {
+) -> Result<Option<BuiltMap>> {
     let folder = if with_cache { warp::default_cache_dir() } else { None };
     let mut stopped = false;
     let found = warp::build_cached(field, spec, folder.as_deref(), &mut |at| {
@@ -148,27 +233,7 @@ pub fn build_map(
         return Ok(None);
     }
     let (map, report, cached) = found?;
-    Ok(Some(Built { map, report, cached }))
-}
-
-impl Built {
-    /// Tells what a user should know about the map.
-    pub fn tell(&self, observer: &mut Observer) {
-        for warning in &self.report.warnings {
-            let _ = observer(&Event::Note(&format!("map: {warning}")));
-        }
-    }
-}
-
-fn phases_match(loaded: &LoadedScenario, robot: &Robot) -> Result<()> {
-    match &loaded.scenario.gait.phases {
-        Some(rows) if rows.len() != robot.feet.len() => {
-            let names: Vec<&str> = robot.feet.iter().map(|foot| foot.name.as_str()).collect();
-            let what = format!("given {} rows, allowed: one by foot, for {}", rows.len(), names.join(", "));
-            Err(loaded.error("gait.phases", what))
-        }
-        _ => Ok(()),
-    }
+    Ok(Some(BuiltMap { map, report, cached }))
 }
 
 /// SHA-256 of every file that goes in.
@@ -187,11 +252,11 @@ fn inputs(loaded: &LoadedScenario, ground: &mut Ground) -> Result<BTreeMap<Strin
 
 fn sha256(path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    Ok(Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(digest::sha256_hex(&bytes))
 }
 
 /// At the guess, in directions spread over all variables.
-fn compare_derivatives(problem: &mut crate::nlp::Problem) -> Vec<DerivativeError> {
+fn compare_derivatives(problem: &mut GaitProblem) -> Vec<DerivativeError> {
     let n = problem.num_variables();
     let mut x = vec![0.0; n];
     problem.initial_point(&mut x);

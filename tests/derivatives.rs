@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use warpgait::constraints::Constraint;
 use warpgait::ipopt::NlpProblem;
-use warpgait::nlp::derivatives;
-use warpgait::nlp::problem::{Choice, Problem};
-use warpgait::nlp::{Model, guess};
+use warpgait::nlp::Constraint;
+use warpgait::nlp::Model;
+use warpgait::planner::problem::Choice;
+use warpgait::planner::{GaitProblem, derivatives, guess};
 use warpgait::robot::Robot;
 use warpgait::scenario::Scenario;
+use warpgait::trajectory::Gait;
 use warpgait::trajectory::space::Space;
 use warpgait::warp::WarpMap;
 
@@ -27,11 +28,11 @@ const TERRAINS: [(&str, &str); 5] = [
 ];
 
 /// A short motion over a terrain, with everything that can be switched on.
-fn problem(terrain: &str, formulation: &str, extra: &str) -> Problem {
+fn problem(terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
     problem_of("anymal_towr", terrain, formulation, extra)
 }
 
-fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Problem {
+fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
     let text = format!(
         "schema = 1\nformulation = \"{formulation}\"\nhorizon = 2.5\n\
          [robot]\nname = \"{robot}\"\nadhesive_feet = [\"RF\"]\n\
@@ -51,9 +52,10 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Pro
             Space::Warped(Box::new(bent(&shear)))
         }
     };
-    let model = Model::new(&scenario, &robot, field, space).expect("a model");
+    let gait = Gait::of(&scenario, &robot).expect("a gait");
+    let model = Model::new(&scenario, &robot, &gait, field, space).expect("a model");
     let x = guess::guess(&scenario, &model).expect("a guess");
-    Problem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
+    GaitProblem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
 }
 
 /// The map with its control points moved smoothly in all three coordinates.
@@ -68,13 +70,13 @@ fn bent(map: &WarpMap) -> WarpMap {
     WarpMap::from_grid(&grid).expect("a map")
 }
 
-fn initial(problem: &Problem) -> Vec<f64> {
+fn initial(problem: &GaitProblem) -> Vec<f64> {
     let mut x = vec![0.0; problem.num_variables()];
     problem.initial_point(&mut x);
     x
 }
 
-fn check(mut problem: Problem, name: &str) {
+fn check(mut problem: GaitProblem, name: &str) {
     let start = initial(&problem);
     let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
     let mut runner = TestRunner::new_with_rng(Config { cases: 1, ..Config::default() }, rng);
@@ -102,7 +104,7 @@ fn check(mut problem: Problem, name: &str) {
 
 /// Switches go anywhere within their room, so that samples change phase from where the patterns were recorded; but not onto
 /// samples, where a foot sets off with a jump of its acceleration.
-fn move_switches(problem: &Problem, noise: &[f64], x: &mut [f64]) {
+fn move_switches(problem: &GaitProblem, noise: &[f64], x: &mut [f64]) {
     for swing in problem.model.layout.feet.iter().flat_map(|f| &f.swings) {
         let Some(lift_off) = swing.switches else { continue };
         for (n, nominal) in [swing.swing.start, swing.swing.end].into_iter().enumerate() {

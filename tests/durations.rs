@@ -7,9 +7,9 @@ use std::path::Path;
 
 use common::solved;
 use warpgait::check::check;
-use warpgait::nlp::solve::Motion;
 use warpgait::pipeline;
 use warpgait::plan::Plan;
+use warpgait::planner::Motion;
 use warpgait::scenario::load_text;
 
 /// The least objective of a feasible iterate.

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use common::solved;
 use warpgait::check::{CheckReport, check};
-use warpgait::nlp::solve::Motion;
 use warpgait::plan::Plan;
+use warpgait::planner::Motion;
 
 /// Solved and checked.
 fn run(text: &str) -> (Motion, Plan, CheckReport) {

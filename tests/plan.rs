@@ -5,8 +5,9 @@ mod common;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-use warpgait::plan::npz::NpzWriter;
-use warpgait::plan::{MapGrid, Plan, WarpedSamples};
+use warpgait::files::npz::NpzWriter;
+use warpgait::plan::{Plan, WarpedSamples};
+use warpgait::warp::MapGrid;
 
 fn full_plan() -> Plan {
     let mut plan = common::standing();

@@ -1,26 +1,20 @@
 //! One case: what is computed in the process of its own, and what comes back from it.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
 use super::clock::{ClockKind, CpuClock};
-use crate::check::check;
-use crate::heightfield::Heightfield;
 use crate::ipopt::NlpProblem;
-use crate::nlp::solve as nlp;
-use crate::plan::sampled::Provenance;
-use crate::plan::{CheckRow, Plan, Seconds};
+use crate::pipeline::{self, Event, Planned, Prepared, Step};
+use crate::plan::CheckRow;
+use crate::planner::{GaitProblem, Seconds, Stage};
 use crate::replay::{Tracked, Verdict};
-use crate::robot::Robot;
-use crate::scenario::{self, Formulation};
-use crate::terrain;
-use crate::warp::{self, MapReport, Order, WarpMap};
-use crate::{Error, Result};
+use crate::scenario::{self, LoadedScenario};
+use crate::warp::{MapReport, Order, WarpMap};
+use crate::{Error, Result, files};
 
 /// Each evaluation is timed so many times; the median counts.
 const REPEATS: usize = 31;
@@ -134,8 +128,6 @@ pub struct MotionMeasured {
     pub history: Vec<f64>,
     /// Laws and verdicts.
     pub checks: Vec<CheckRow>,
-    /// Why there are none.
-    pub check_error: Option<String>,
     /// Wall time by the solver's own account.
     pub seconds: Seconds,
     /// How long evaluations take; for `speed`.
@@ -157,109 +149,125 @@ pub struct Evaluation {
 
 /// Computes a case from its scenario file; `plan` is where its plan goes.
 pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
-    let mut clock = CpuClock::start();
-    let mut cpu = Cpu { clock: clock.kind(), ..Cpu::default() };
+    let mut stopwatch = Stopwatch::start();
     let loaded = scenario::load(scenario, &[])?;
-    let asked = &loaded.scenario;
-    let robot = Robot::load(&asked.robot, &loaded.base_dir)?;
-    let ground = terrain::build(&asked.terrain, &loaded.base_dir)?;
-    loaded.ensure_inside(ground.field.extent())?;
-    cpu.terrain = clock.lap();
-
-    let start = Instant::now();
-    let built = match (work, asked.formulation) {
-        (Work::Plan | Work::Track | Work::Speed, Formulation::Direct) => None,
-        // A map that is to be measured is built, whatever the cache holds.
-        (Work::Map, _) => Some(build_map(&ground.field, &asked.map, false)?),
-        _ => {
-            let built = build_map(&ground.field, &asked.map, true)?;
-            built.1.ensure_injective()?;
-            Some(built)
-        }
-    };
-    let map_seconds = start.elapsed().as_secs_f64();
-    cpu.map = clock.lap();
-    let map = built.as_ref().map(|(map, report, cached)| MapMeasured {
-        cached: *cached,
-        report: report.clone(),
-        ground_errors: if work == Work::Map { ground_errors(map) } else { Vec::new() },
-    });
     if work == Work::Map {
-        return Ok(Measured { motion: None, map, track: None, cpu });
+        return map_alone(&loaded, stopwatch);
     }
-    let warp = built.as_ref().map(|(map, _, _)| map);
-    let field = Arc::new(ground.field.clone());
-    clock.lap();
-
-    let mut stages: Vec<(bool, f64)> = Vec::new();
-    let mut continuation = false;
-    let motion = nlp::solve(asked, &robot, &field, warp, &mut |at| {
-        continuation |= at.stage != "solve";
-        // The steps of a continuation before its last one are on gentler ground.
-        let whole = at.stage == "solve" || at.stage.ends_with(" 100 %");
-        stages.push((whole, at.record.violation));
+    let mut watch = Watch { stopwatch: &mut stopwatch, iterations: Vec::new() };
+    let planned = pipeline::run(&loaded, false, &mut |event| {
+        watch.observe(event);
         ControlFlow::Continue(())
     })?;
-    cpu.solve = clock.lap();
-    let provenance = Provenance {
-        scenario: asked,
-        text: &loaded.text,
-        robot: &robot,
-        ground: &ground,
-        inputs: BTreeMap::new(),
-        map_seconds,
-    };
-    let mut made = Plan::from_motion(&motion, &provenance);
-    let (checks, check_error) = match check(&made) {
-        Ok(found) => (found.rows, None),
-        Err(error) => (Vec::new(), Some(error.to_string())),
-    };
-    made.meta.checks = checks.clone();
-    // A plan with numbers that are not finite cannot be written; `check_error` says so.
-    if check_error.is_none() {
-        made.write(plan)?;
-    }
-    cpu.check = clock.lap();
+    let iterations = watch.iterations;
+    let planned = planned.ok_or_else(|| Error::Internal("interrupted".into()))?;
+    planned.plan.write(plan)?;
+    let cpu = stopwatch.stop();
 
-    let tolerance = asked.solver.tolerance;
-    let worst = motion.violations.iter().max_by(|a, b| a.largest.total_cmp(&b.largest));
-    let evaluation = match work {
-        Work::Speed => Some(evaluation(&mut nlp::problem(asked, &robot, &field, warp)?)),
-        _ => None,
-    };
-    let motion = MotionMeasured {
-        solved: motion.solved,
-        passed: check_error.is_none() && checks.iter().all(|row| row.passed),
-        status: motion.status.clone(),
-        iterations: motion.iterations,
-        first_feasible: stages
-            .iter()
-            .zip(&motion.history)
-            .find(|((whole, violation), _)| *whole && *violation <= tolerance)
-            .map(|(_, record)| record.iteration),
-        continuation,
-        violation: finite(motion.max_violation()),
-        worst_block: worst.map_or(String::new(), |w| w.block.clone()),
-        worst_place: worst.map_or(String::new(), |w| {
-            let foot = w.foot.as_ref().map_or(String::new(), |foot| format!("{foot} at "));
-            format!("{foot}{:.3} s, base at ({:.2}, {:.2}) m", w.time, w.place[0], w.place[1])
-        }),
-        history: motion.history.iter().map(|record| finite(record.violation)).collect(),
-        checks: checks.into_iter().map(|row| CheckRow { value: finite(row.value), ..row }).collect(),
-        check_error,
-        seconds: motion.seconds,
-        evaluation,
-    };
+    let mut motion = MotionMeasured::of(&planned, &iterations, loaded.scenario.solver.tolerance);
+    if work == Work::Speed {
+        let map = planned.map.as_ref().map(|built| &built.map);
+        motion.evaluation = Some(evaluation(&mut planned.prepared.task(&loaded, map).problem()?));
+    }
+    let map = planned.map.map(|built| MapMeasured {
+        cached: built.cached,
+        report: built.report,
+        ground_errors: Vec::new(),
+    });
     Ok(Measured { motion: Some(motion), map, track: None, cpu })
 }
 
-fn build_map(
-    field: &Heightfield,
-    spec: &scenario::MapSpec,
-    with_cache: bool,
-) -> Result<(WarpMap, MapReport, bool)> {
-    let folder = if with_cache { warp::default_cache_dir() } else { None };
-    warp::build_cached(field, spec, folder.as_deref(), &mut |_| ControlFlow::Continue(()))
+/// A map that is to be measured is built, whatever the cache holds.
+fn map_alone(loaded: &LoadedScenario, mut stopwatch: Stopwatch) -> Result<Measured> {
+    let mut silent = |_: &Event| ControlFlow::Continue(());
+    let prepared = Prepared::new(loaded, &mut silent)?;
+    stopwatch.begin(Step::Map);
+    let built = pipeline::build_map(&prepared.surface, &loaded.scenario.map, false, &mut silent)?;
+    let built = built.ok_or_else(|| Error::Internal("interrupted".into()))?;
+    let cpu = stopwatch.stop();
+    let map =
+        MapMeasured { cached: built.cached, ground_errors: ground_errors(&built.map), report: built.report };
+    Ok(Measured { motion: None, map: Some(map), track: None, cpu })
+}
+
+/// Processor time by step of the pipeline.
+struct Stopwatch {
+    clock: CpuClock,
+    step: Step,
+    cpu: Cpu,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        let clock = CpuClock::start();
+        let cpu = Cpu { clock: clock.kind(), ..Cpu::default() };
+        Self { clock, step: Step::Terrain, cpu }
+    }
+
+    /// Time from here on belongs to this step.
+    fn begin(&mut self, step: Step) {
+        let lap = self.clock.lap();
+        match self.step {
+            Step::Terrain => self.cpu.terrain += lap,
+            Step::Map => self.cpu.map += lap,
+            Step::Derivatives | Step::Solve => self.cpu.solve += lap,
+            Step::Plan => self.cpu.check += lap,
+        }
+        self.step = step;
+    }
+
+    fn stop(mut self) -> Cpu {
+        self.begin(self.step);
+        self.cpu
+    }
+}
+
+/// What a case keeps of the events of a pipeline.
+struct Watch<'a> {
+    stopwatch: &'a mut Stopwatch,
+    /// Stage and violation of every iteration.
+    iterations: Vec<(Stage, f64)>,
+}
+
+impl Watch<'_> {
+    fn observe(&mut self, event: &Event) {
+        match event {
+            Event::Step(step) => self.stopwatch.begin(*step),
+            Event::Iteration(at) => self.iterations.push((at.stage, at.record.violation)),
+            Event::Note(_) | Event::Map(_) => {}
+        }
+    }
+}
+
+impl MotionMeasured {
+    fn of(planned: &Planned, iterations: &[(Stage, f64)], tolerance: f64) -> Self {
+        let (motion, check) = (&planned.motion, &planned.check);
+        let worst = motion.violations.iter().max_by(|a, b| a.largest.total_cmp(&b.largest));
+        let rows = check.rows.iter().cloned();
+        Self {
+            solved: motion.solved,
+            passed: check.passed,
+            status: motion.status.clone(),
+            iterations: motion.iterations,
+            // The other stages are on gentler ground, or lack some of the constraints.
+            first_feasible: iterations
+                .iter()
+                .zip(&motion.history)
+                .find(|((stage, violation), _)| stage.is_whole() && *violation <= tolerance)
+                .map(|(_, record)| record.iteration),
+            continuation: iterations.iter().any(|(stage, _)| stage.is_continuation()),
+            violation: finite(motion.max_violation()),
+            worst_block: worst.map_or(String::new(), |w| w.block.clone()),
+            worst_place: worst.map_or(String::new(), |w| {
+                let foot = w.foot.as_ref().map_or(String::new(), |foot| format!("{foot} at "));
+                format!("{foot}{:.3} s, base at ({:.2}, {:.2}) m", w.time, w.place[0], w.place[1])
+            }),
+            history: motion.history.iter().map(|record| finite(record.violation)).collect(),
+            checks: rows.map(|row| CheckRow { value: finite(row.value), ..row }).collect(),
+            seconds: motion.seconds,
+            evaluation: None,
+        }
+    }
 }
 
 fn finite(value: f64) -> f64 {
@@ -282,15 +290,15 @@ fn ground_errors(map: &WarpMap) -> Vec<[f64; 3]> {
 }
 
 /// Times the functions of an NLP at its start, multipliers all 1.
-fn evaluation(problem: &mut crate::nlp::Problem) -> Evaluation {
-    let size = nlp::size(problem);
+fn evaluation(problem: &mut GaitProblem) -> Evaluation {
+    let size = problem.size();
     let [n, m, entries, hessian_entries] = size;
     let mut x = vec![0.0; n];
     problem.initial_point(&mut x);
     let multipliers = vec![1.0; m];
     let (mut g, mut jacobian, mut hessian) = (vec![0.0; m], vec![0.0; entries], vec![0.0; hessian_entries]);
     // What the functions share is computed once for a point: each time the point must be another.
-    let mut timed = |work: &mut dyn FnMut(&mut crate::nlp::Problem, &[f64])| {
+    let mut timed = |work: &mut dyn FnMut(&mut GaitProblem, &[f64])| {
         let mut once = || {
             x[n - 1] += 1e-6;
             let start = Instant::now();
@@ -315,7 +323,7 @@ fn evaluation(problem: &mut crate::nlp::Problem) -> Evaluation {
 pub fn run_to_file(work: Work, scenario: &Path, plan: &Path, result: &Path) -> Result<()> {
     let measured = run(work, scenario, plan)?;
     let json = serde_json::to_vec(&measured).map_err(|e| Error::Internal(format!("result: {e}")))?;
-    crate::plan::npz::write_atomically(result, &json)
+    files::write_atomically(result, &json)
 }
 
 #[cfg(test)]

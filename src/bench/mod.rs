@@ -32,7 +32,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::Result;
-use crate::plan::npz::write_atomically;
+use crate::files::write_atomically;
 pub use orphan::end_with;
 pub use protocol::Bench;
 

@@ -165,17 +165,18 @@ pub fn verdict(row: &Row) -> String {
     };
     let walked = measured.track.as_ref().map_or(String::new(), tracking::verdict);
     let effort = format!("{} iterations, {} s", motion.iterations, number(measured.cpu.solve));
-    match (&motion.check_error, failed_checks(motion)) {
-        _ if !motion.solved => format!(
+    if !motion.solved {
+        return format!(
             "NOT SOLVED ({effort}): {}; {} misses by {}, {}",
             motion.status,
             motion.worst_block,
             number(motion.violation),
             motion.worst_place
-        ),
-        (Some(error), _) => format!("solved ({effort}), but cannot be checked: {error}"),
-        (None, failed) if failed.is_empty() => format!("solved, checks hold ({effort}){walked}"),
-        (None, failed) => format!("solved ({effort}), CHECK FAILS: {failed}"),
+        );
+    }
+    match failed_checks(motion) {
+        failed if failed.is_empty() => format!("solved, checks hold ({effort}){walked}"),
+        failed => format!("solved ({effort}), CHECK FAILS: {failed}"),
     }
 }
 

@@ -8,8 +8,8 @@ use serde_json::json;
 use super::Ending;
 use super::console::Console;
 use crate::check::{CheckReport, Limits, check_with};
+use crate::files::{ensure_writable, write_atomically};
 use crate::plan::Plan;
-use crate::plan::npz::{ensure_writable, write_atomically};
 use crate::{Result, report};
 
 #[derive(Debug, Args)]

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Ending;
 use super::console::Console;
-use crate::plan::npz::write_atomically;
+use crate::files::write_atomically;
 use crate::{Error, Result, scenario};
 
 #[derive(Debug, Args)]

@@ -9,9 +9,10 @@ use serde_json::json;
 use super::Ending;
 use super::console::Console;
 use super::progress::Progress;
+use crate::files::ensure_writable;
+use crate::files::npz::NpzWriter;
 use crate::heightfield::Heightfield;
-use crate::pipeline::{self, Built, Event};
-use crate::plan::npz::{NpzWriter, ensure_writable};
+use crate::pipeline::{self, BuiltMap, Event};
 use crate::report::map_table;
 use crate::scenario;
 use crate::warp::{MapReport, WarpMap};
@@ -47,9 +48,9 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     };
     let built = pipeline::build_map(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut show)?;
     let Some(built) = built else { return Ok(Ending::Interrupted) };
-    built.tell(&mut show);
+    built.report_warnings(&mut show);
     drop(progress);
-    let Built { map, report, cached } = &built;
+    let BuiltMap { map, report, cached } = &built;
     if let Some(output) = &arguments.output {
         write(output, map, &ground.field, report)?;
     }

@@ -35,7 +35,7 @@ impl Progress {
     /// Shows what is going on.
     pub fn show(&mut self, event: &Event) {
         match event {
-            Event::Stage(stage) => self.update(stage, ""),
+            Event::Step(step) => self.update(&step.to_string(), ""),
             Event::Note(text) => self.note(text),
             Event::Map(at) => {
                 let [x, y, z] = at.cells;
@@ -51,7 +51,7 @@ impl Progress {
                     "iteration {}, violation {:.1e}, objective {:.3e}",
                     at.iteration, record.violation, record.objective
                 );
-                self.update(at.stage, &detail);
+                self.update(&at.stage.to_string(), &detail);
             }
         }
     }

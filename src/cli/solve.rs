@@ -11,11 +11,11 @@ use super::console::Console;
 use super::progress::Progress;
 use super::{Ending, beside, check};
 use crate::check::CheckReport;
-use crate::nlp::derivatives::DerivativeError;
-use crate::nlp::solve::Motion;
-use crate::pipeline::{self, Outcome};
+use crate::files::{ensure_writable, write_atomically};
+use crate::pipeline::{self, Planned};
 use crate::plan::Plan;
-use crate::plan::npz::{ensure_writable, write_atomically};
+use crate::planner::Motion;
+use crate::planner::derivatives::DerivativeError;
 use crate::scenario::{self, LoadedScenario};
 use crate::{Error, Result, report};
 
@@ -59,13 +59,13 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     super::listen_for_ctrl_c()?;
 
     let mut progress = Progress::new(console.is_quiet());
-    let outcome = pipeline::run(&loaded, arguments.check_derivatives, &mut |event| {
+    let planned = pipeline::run(&loaded, arguments.check_derivatives, &mut |event| {
         progress.show(event);
         ControlFlow::Continue(())
     })?;
     // Without a map there is no iterate to keep.
-    let Some(outcome) = outcome else { return Ok(Ending::Interrupted) };
-    let Outcome { plan, motion, check: found, ground, map: built, derivatives } = outcome;
+    let Some(planned) = planned else { return Ok(Ending::Interrupted) };
+    let Planned { prepared, map: built, plan, motion, check: found, derivatives } = planned;
     plan.write(&output)?;
     if let Some(plot) = &plot {
         write_atomically(plot, report::sheet(&plan).as_bytes())?;
@@ -86,7 +86,7 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
         "passed": found.passed,
         "interrupted": motion.interrupted,
         "solver": plan.meta.solver,
-        "terrain": ground,
+        "terrain": prepared.ground.report,
         "map": built.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
         "violations": motion.violations,
         "derivatives": derivatives,

@@ -8,12 +8,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Place, height_form};
+use super::margins;
 use crate::heightfield::HeightJet;
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::ground_normal::height_form;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::BaseNode;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::cross_matrix;
 
@@ -56,7 +58,7 @@ impl Constraint for BaseClearance {
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(self.clearance);
+        lower.fill(self.clearance + margins::BASE_CLEARANCE);
         upper.fill(f64::INFINITY);
     }
 
@@ -71,8 +73,8 @@ impl Constraint for BaseClearance {
             let (base, node) = (&state.base[*k], &model.layout.base[*k]);
             let (arm, _, _, by_q) = point(model, base, b);
             // dq = dp + δ × R b.
-            Tangent::position(model, &base.point, node).row(first + r, &by_q, sink);
-            Tangent::turn(model, base, node).row(first + r, &arm.cross(&by_q), sink);
+            Tangent::position(model, &base.point, node).add_along(&by_q, &mut sink.row(first + r));
+            Tangent::turn(model, base, node).add_along(&arm.cross(&by_q), &mut sink.row(first + r));
         }
     }
 
@@ -81,7 +83,7 @@ impl Constraint for BaseClearance {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         let mut multipliers = multipliers.iter();
@@ -109,7 +111,7 @@ impl Constraint for BaseClearance {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        Place { foot: None, sample: self.places[row].0 as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        RowPlace { foot: None, sample: self.places[row].0 as f64 }
     }
 }

@@ -9,9 +9,9 @@
 //! A swing takes at least [`SHORTEST_SWING`] time steps besides. That the durations of a foot sum to the horizon T needs no row: the switches are the variables. Rows: by foot, its phases
 //! in order of time, s.
 
-use super::{Constraint, Place};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::Sink;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::switches::SHORTEST_SWING;
 
@@ -19,11 +19,11 @@ use crate::trajectory::switches::SHORTEST_SWING;
 #[derive(Clone, Debug)]
 pub struct Durations {
     bounds: [f64; 2],
-    phases: Vec<Phase>,
+    phases: Vec<BoundedPhase>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Phase {
+struct BoundedPhase {
     foot: usize,
     start: Edge,
     end: Edge,
@@ -50,12 +50,12 @@ impl Durations {
                 for which in 0..2 {
                     let nominal = [s.swing.start, s.swing.end][which];
                     let end = Edge::Switch { swing, which, variable: lift_off + which, nominal };
-                    phases.push(Phase { foot, start, end });
+                    phases.push(BoundedPhase { foot, start, end });
                     start = end;
                 }
             }
             if matches!(start, Edge::Switch { .. }) {
-                phases.push(Phase { foot, start, end: Edge::End(layout.intervals as f64) });
+                phases.push(BoundedPhase { foot, start, end: Edge::End(layout.intervals as f64) });
             }
         }
         Self { bounds, phases }
@@ -112,14 +112,14 @@ impl Constraint for Durations {
         _model: &Model,
         _state: &State,
         _multipliers: &[f64],
-        _curvature: &mut Curvature,
+        _curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
     }
 
-    fn place(&self, row: usize) -> Place {
+    fn place(&self, row: usize) -> RowPlace {
         let phase = &self.phases[row];
         let (Edge::End(sample) | Edge::Switch { nominal: sample, .. }) = phase.start;
-        Place { foot: Some(phase.foot), sample }
+        RowPlace { foot: Some(phase.foot), sample }
     }
 }

@@ -20,11 +20,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Place};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::{cross_matrix, skew_part};
 
@@ -173,24 +173,24 @@ impl Constraint for Dynamics {
                     let position = Tangent::position(model, &contact.point, foothold);
                     let (arm_form, force_form) = (cross_matrix(&arm) * weight, -cross_matrix(&f));
                     for c in 0..3 {
-                        by_force.component(row + c, c, weight, sink);
-                        by_foothold.component(row + c, c, weight, sink);
+                        by_force.add_component(c, weight, &mut sink.row(row + c));
+                        by_foothold.add_component(c, weight, &mut sink.row(row + c));
                         let by_f = arm_form.row(c).transpose();
-                        by_force.row(row + 3 + c, &by_f, sink);
-                        by_foothold.row(row + 3 + c, &by_f, sink);
-                        position.row(row + 3 + c, &force_form.row(c).transpose(), sink);
+                        by_force.add_along(&by_f, &mut sink.row(row + 3 + c));
+                        by_foothold.add_along(&by_f, &mut sink.row(row + 3 + c));
+                        position.add_along(&force_form.row(c).transpose(), &mut sink.row(row + 3 + c));
                     }
                 }
                 let position = Tangent::position(model, &base.point, &layout.base[l]);
                 let form = cross_matrix(&total);
                 for c in 0..3 {
-                    position.row(row + 3 + c, &form.row(c).transpose(), sink);
+                    position.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
                 }
             }
             for &(j, coefficient) in &stencil.position {
                 let position = Tangent::position(model, &state.base[j].point, &layout.base[j]);
                 for c in 0..3 {
-                    position.component(row + c, c, -coefficient * acceleration, sink);
+                    position.add_component(c, -coefficient * acceleration, &mut sink.row(row + c));
                 }
             }
             if stencil.turn.is_empty() {
@@ -203,14 +203,14 @@ impl Constraint for Dynamics {
                 let form = g - Matrix3::identity() * g.trace();
                 let turn = Tangent::turn(model, &state.base[j], &layout.base[j]);
                 for c in 0..3 {
-                    turn.row(row + 3 + c, &form.row(c).transpose(), sink);
+                    turn.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
                 }
             }
             let n = self.turned(model, state, k) * r_t * scale;
             let form = Matrix3::identity() * n.trace() - n.transpose();
             let turn = Tangent::turn(model, &state.base[k], &layout.base[k]);
             for c in 0..3 {
-                turn.row(row + 3 + c, &form.row(c).transpose(), sink);
+                turn.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
             }
         }
     }
@@ -220,7 +220,7 @@ impl Constraint for Dynamics {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         let layout = &model.layout;
@@ -278,7 +278,7 @@ impl Constraint for Dynamics {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        Place { foot: None, sample: (row / 6) as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        RowPlace { foot: None, sample: (row / 6) as f64 }
     }
 }

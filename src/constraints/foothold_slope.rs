@@ -9,12 +9,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::stance::all_stances;
-use super::{Constraint, Place};
 use crate::heightfield::HeightJet;
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::FootNode;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 
 /// Footholds on gentle ground.
@@ -87,7 +87,7 @@ impl Constraint for FootholdSlope {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
             let slope = gradient(&ground(model, contact, d));
-            Tangent::position(model, &contact.point, node).row(first + r, &slope, sink);
+            Tangent::position(model, &contact.point, node).add_along(&slope, &mut sink.row(first + r));
         }
     }
 
@@ -96,7 +96,7 @@ impl Constraint for FootholdSlope {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (&lambda, &(i, j, d)) in multipliers.iter().zip(&self.places) {
@@ -109,7 +109,7 @@ impl Constraint for FootholdSlope {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        Place { foot: Some(self.places[row].0), sample: self.samples[row] }
+    fn place(&self, row: usize) -> RowPlace {
+        RowPlace { foot: Some(self.places[row].0), sample: self.samples[row] }
     }
 }

@@ -14,90 +14,30 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Normal, Place};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::contact_force::{ForceSample, ForceTangents, force_samples};
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::ground_normal::GroundNormal;
 use crate::nlp::model::CONE_ROUNDING;
 use crate::nlp::sink::Sink;
-use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
-use crate::trajectory::LinearNode;
-
-/// A force of a foot: (foot, stance, sample).
-pub(crate) type ForcePlace = (usize, usize, usize);
-
-/// All free forces of the feet that `wanted` says yes to.
-pub(crate) fn force_places(model: &Model, wanted: impl Fn(usize) -> bool) -> Vec<ForcePlace> {
-    let mut places = Vec::new();
-    for (i, foot) in model.layout.feet.iter().enumerate() {
-        if wanted(i) {
-            for (j, stance) in foot.stances.iter().enumerate() {
-                places.extend(stance.free_forces().map(|(k, _)| (i, j, k)));
-            }
-        }
-    }
-    places
-}
 
 /// Forces inside the cone.
 #[derive(Clone, Debug)]
 pub struct Friction {
     friction: f64,
-    places: Vec<ForcePlace>,
+    samples: Vec<ForceSample>,
 }
 
 impl Friction {
     /// For all feet that do not adhere.
     pub fn new(model: &Model, friction: f64) -> Self {
-        Self { friction, places: force_places(model, |i| !model.adhesive[i]) }
+        Self { friction, samples: force_samples(model, |i| !model.adhesive[i]) }
     }
 }
 
-/// The node of a force, the full one where durations are optimized.
-pub(crate) fn force_node(model: &Model, (i, j, k): ForcePlace) -> &LinearNode {
-    let stance = &model.layout.feet[i].stances[j];
-    stance.force(k).expect("places are those of free forces")
-}
-
-/// The tangents of a force and of its foothold.
-pub(crate) fn with_tangents<T>(
-    model: &Model,
-    state: &State,
-    (i, j, k): ForcePlace,
-    act: impl FnOnce(&Tangent, &Tangent, &Tangent) -> T,
-) -> T {
-    let contact = &state.contacts[i][j];
-    let foothold = &model.layout.feet[i].stances[j].foothold;
-    act(
-        &Tangent::force(model, contact, force_node(model, (i, j, k))),
-        &Tangent::force_by_foothold(model, contact, foothold, &state.warped_full_forces[i][k]),
-        &Tangent::position(model, &contact.point, foothold),
-    )
-}
-
-/// Says the second derivatives of a function of (f, p_i) with blocks ∂²/∂f², ∂²/∂f∂p and ∂²/∂p².
-pub(crate) fn say_blocks(
-    model: &Model,
-    state: &State,
-    place: ForcePlace,
-    ff: Option<&Matrix3<f64>>,
-    fp: &Matrix3<f64>,
-    pp: &Matrix3<f64>,
-    sink: &mut Sink,
-) {
-    with_tangents(model, state, place, |force, by_foothold, position| {
-        if let Some(ff) = ff {
-            force.quadratic(ff, sink);
-            by_foothold.quadratic(ff, sink);
-            force.cross(ff, by_foothold, sink);
-        }
-        force.cross(fp, position, sink);
-        by_foothold.cross(fp, position, sink);
-        position.quadratic(pp, sink);
-    });
-}
-
 /// g(u, w) = ν u − (w − u²)/r(u), r = √(ν² u² + ε²), with its derivatives; u = n·f, w = ‖f‖².
-pub(crate) struct Cone {
+pub(crate) struct FrictionCone {
     pub g: f64,
     pub u: f64,
     pub w: f64,
@@ -105,7 +45,7 @@ pub(crate) struct Cone {
     pub uw: f64,
 }
 
-impl Cone {
+impl FrictionCone {
     pub fn new(friction: f64, u: f64, w: f64) -> Self {
         let square = friction * friction;
         let r = (square * u * u + CONE_ROUNDING * CONE_ROUNDING).sqrt();
@@ -123,11 +63,15 @@ impl Cone {
 }
 
 /// The normal, f, ∂u/∂p, and the cone there.
-fn parts(friction: f64, state: &State, (i, j, k): ForcePlace) -> (Normal, Vector3<f64>, Vector3<f64>, Cone) {
-    let normal = Normal::new(&state.contacts[i][j].ground);
-    let f = state.full_forces[i][k];
+fn parts(
+    friction: f64,
+    state: &State,
+    at: ForceSample,
+) -> (GroundNormal, Vector3<f64>, Vector3<f64>, FrictionCone) {
+    let normal = GroundNormal::new(&state.contacts[at.foot][at.stance].ground);
+    let f = state.full_forces[at.foot][at.sample];
     let (u, du) = normal.along(&f);
-    (normal, f, du, Cone::new(friction, u, f.norm_squared()))
+    (normal, f, du, FrictionCone::new(friction, u, f.norm_squared()))
 }
 
 impl Constraint for Friction {
@@ -136,7 +80,7 @@ impl Constraint for Friction {
     }
 
     fn rows(&self) -> usize {
-        self.places.len()
+        self.samples.len()
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
@@ -145,20 +89,20 @@ impl Constraint for Friction {
     }
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
-        for (value, &place) in out.iter_mut().zip(&self.places) {
-            *value = parts(self.friction, state, place).3.g;
+        for (value, &at) in out.iter_mut().zip(&self.samples) {
+            *value = parts(self.friction, state, at).3.g;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (r, &place) in self.places.iter().enumerate() {
-            let (normal, f, du, cone) = parts(self.friction, state, place);
+        for (r, &at) in self.samples.iter().enumerate() {
+            let (normal, f, du, cone) = parts(self.friction, state, at);
             let by_force = normal.n * cone.u + f * (2.0 * cone.w);
-            with_tangents(model, state, place, |force, by_foothold, position| {
-                force.row(first + r, &by_force, sink);
-                by_foothold.row(first + r, &by_force, sink);
-                position.row(first + r, &(du * cone.u), sink);
-            });
+            let tangents = ForceTangents::new(model, state, at);
+            let mut row = sink.row(first + r);
+            tangents.force.add_along(&by_force, &mut row);
+            tangents.by_foothold.add_along(&by_force, &mut row);
+            tangents.foothold.add_along(&(du * cone.u), &mut row);
         }
     }
 
@@ -167,14 +111,14 @@ impl Constraint for Friction {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
-        for (&lambda, &place) in multipliers.iter().zip(&self.places) {
-            let (normal, f, du, cone) = parts(self.friction, state, place);
-            let ((i, j, k), n) = (place, normal.n);
-            curvature.full_forces[i][k] += (n * cone.u + f * (2.0 * cone.w)) * lambda;
-            curvature.contacts[i][j] += du * (cone.u * lambda);
+        for (&lambda, &at) in multipliers.iter().zip(&self.samples) {
+            let (normal, f, du, cone) = parts(self.friction, state, at);
+            let n = normal.n;
+            curvature.full_forces[at.foot][at.sample] += (n * cone.u + f * (2.0 * cone.w)) * lambda;
+            curvature.contacts[at.foot][at.stance] += du * (cone.u * lambda);
             // By the chain rule through u(f, p) and w(f).
             let mixed = n * cone.uu + f * (2.0 * cone.uw);
             let ff = Matrix3::identity() * (2.0 * cone.w)
@@ -182,12 +126,12 @@ impl Constraint for Friction {
                 + f * n.transpose() * (2.0 * cone.uw);
             let fp = normal.jacobian() * cone.u + mixed * du.transpose();
             let pp = normal.curvature(&f) * cone.u + du * du.transpose() * cone.uu;
-            say_blocks(model, state, place, Some(&(ff * lambda)), &(fp * lambda), &(pp * lambda), sink);
+            let tangents = ForceTangents::new(model, state, at);
+            tangents.add_blocks(Some(&(ff * lambda)), &(fp * lambda), &(pp * lambda), sink);
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        let (i, _, k) = self.places[row];
-        Place { foot: Some(i), sample: k as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        self.samples[row].place()
     }
 }

@@ -8,23 +8,24 @@
 
 use nalgebra::Vector3;
 
-use super::friction::{Cone, ForcePlace, force_node, force_places};
-use super::{Constraint, Place};
-use crate::nlp::curvature::Curvature;
+use super::friction::FrictionCone;
+use crate::nlp::contact_force::{ForceSample, force_node, force_samples};
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::Sink;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 
 /// Pulled-back forces inside the constant cone.
 #[derive(Clone, Debug)]
 pub struct FrictionConformal {
     friction: f64,
-    places: Vec<ForcePlace>,
+    samples: Vec<ForceSample>,
 }
 
 impl FrictionConformal {
     /// For all feet that do not adhere.
     pub fn new(model: &Model, friction: f64) -> Self {
-        Self { friction, places: force_places(model, |i| !model.adhesive[i]) }
+        Self { friction, samples: force_samples(model, |i| !model.adhesive[i]) }
     }
 }
 
@@ -34,7 +35,7 @@ impl Constraint for FrictionConformal {
     }
 
     fn rows(&self) -> usize {
-        self.places.len()
+        self.samples.len()
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
@@ -43,19 +44,19 @@ impl Constraint for FrictionConformal {
     }
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
-        for (value, &(i, _, k)) in out.iter_mut().zip(&self.places) {
-            let f = &state.warped_full_forces[i][k];
-            *value = Cone::new(self.friction, f.z, f.norm_squared()).g;
+        for (value, at) in out.iter_mut().zip(&self.samples) {
+            let f = &state.warped_full_forces[at.foot][at.sample];
+            *value = FrictionCone::new(self.friction, f.z, f.norm_squared()).g;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (r, &(i, j, k)) in self.places.iter().enumerate() {
-            let f = &state.warped_full_forces[i][k];
-            let cone = Cone::new(self.friction, f.z, f.norm_squared());
+        for (r, &at) in self.samples.iter().enumerate() {
+            let f = &state.warped_full_forces[at.foot][at.sample];
+            let cone = FrictionCone::new(self.friction, f.z, f.norm_squared());
             let gradient = f * (2.0 * cone.w) + Vector3::z() * cone.u;
             for d in 0..3 {
-                sink.node(first + r, force_node(model, (i, j, k)), d, gradient[d]);
+                sink.node(first + r, force_node(model, at), d, gradient[d]);
             }
         }
     }
@@ -65,13 +66,13 @@ impl Constraint for FrictionConformal {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        _curvature: &mut Curvature,
+        _curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
-        for (&lambda, &(i, j, k)) in multipliers.iter().zip(&self.places) {
-            let f = &state.warped_full_forces[i][k];
-            let cone = Cone::new(self.friction, f.z, f.norm_squared());
-            let node = force_node(model, (i, j, k));
+        for (&lambda, &at) in multipliers.iter().zip(&self.samples) {
+            let f = &state.warped_full_forces[at.foot][at.sample];
+            let cone = FrictionCone::new(self.friction, f.z, f.norm_squared());
+            let node = force_node(model, at);
             sink.own(node, 0, 0, lambda * 2.0 * cone.w);
             sink.own(node, 1, 1, lambda * 2.0 * cone.w);
             sink.own(node, 2, 0, lambda * 2.0 * cone.uw * f.x);
@@ -80,8 +81,7 @@ impl Constraint for FrictionConformal {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        let (i, _, k) = self.places[row];
-        Place { foot: Some(i), sample: k as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        self.samples[row].place()
     }
 }

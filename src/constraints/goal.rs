@@ -8,10 +8,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Place};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 
 /// The end of the motion.
@@ -62,12 +62,12 @@ impl Constraint for Goal {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         let (base, node) = (&state.base[self.last], &model.layout.base[self.last]);
         let position = Tangent::position(model, &base.point, node);
-        position.component(first, 0, 1.0, sink);
-        position.component(first + 1, 1, 1.0, sink);
+        position.add_component(0, 1.0, &mut sink.row(first));
+        position.add_component(1, 1.0, &mut sink.row(first + 1));
         if let Some(yaw) = self.yaw {
             // s · (δ × x) = δ · (x × s).
             let x: Vector3<f64> = base.rotation().column(0).into();
-            Tangent::turn(model, base, node).row(first + 2, &x.cross(&side(yaw)), sink);
+            Tangent::turn(model, base, node).add_along(&x.cross(&side(yaw)), &mut sink.row(first + 2));
         }
     }
 
@@ -76,7 +76,7 @@ impl Constraint for Goal {
         _model: &Model,
         _state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
         curvature.base_position[self.last] += Vector3::new(multipliers[0], multipliers[1], 0.0);
@@ -87,7 +87,7 @@ impl Constraint for Goal {
         }
     }
 
-    fn place(&self, _row: usize) -> Place {
-        Place { foot: None, sample: self.last as f64 }
+    fn place(&self, _row: usize) -> RowPlace {
+        RowPlace { foot: None, sample: self.last as f64 }
     }
 }

@@ -1,7 +1,7 @@
 //! Hip and knee of a swinging leg turn no faster than they can.
 //!
 //! ```text
-//!   −share ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ share,  q = (φ, κ),  r = Rᵀ(p_i − p)
+//!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  q = (φ, κ),  r = Rᵀ(p_i − p)
 //! ```
 //!
 //! φ and κ are the angles of thigh and knee, see [`crate::leg`]. The abduction is slow and has no row. Legs of which the robot's file knows
@@ -9,20 +9,18 @@
 //!
 //! Over whole intervals a foot that is flicked over an edge within two of them would pass at half its true speed.
 //!
-//! Rows: thigh, knee for each half of an interval of which at least one end lies in a swing; share of the limit.
+//! Rows: thigh, knee for each half of an interval of which at least one end lies in a swing; fraction of the limit.
 
-use super::{Constraint, Place, reach};
+use super::margins;
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::foot_in_base;
 use crate::nlp::sink::Sink;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
-
-/// Of the limit. The rest is for what happens between samples and for what the plan does not know: the legs' own mass moves the trunk against
-/// the centre of mass.
-const SHARE: f64 = 0.72;
 
 /// Speeds of swinging legs.
 #[derive(Clone, Debug)]
@@ -55,7 +53,7 @@ fn angles<T: Scalar>(leg: &Leg, r: [T; 3]) -> [T; 2] {
 }
 
 fn jets(model: &Model, state: &State, (i, ends, leg): &(usize, [Instant; 2], Leg), after: usize) -> [Jet; 2] {
-    angles(leg, Jet::variables(&reach::value(model, state, (*i, ends[after]))))
+    angles(leg, Jet::variables(&foot_in_base::value(model, state, (*i, ends[after]))))
 }
 
 /// Of the row, by the angle at the end `after`.
@@ -73,13 +71,14 @@ impl Constraint for JointSpeed {
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(-SHARE);
-        upper.fill(SHARE);
+        lower.fill(-margins::JOINT_SPEED);
+        upper.fill(margins::JOINT_SPEED);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
         for (rows, &(i, ends, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let [before, after] = ends.map(|at| angles(&leg, reach::value(model, state, (i, at)).into()));
+            let [before, after] =
+                ends.map(|at| angles(&leg, foot_in_base::value(model, state, (i, at)).into()));
             for (j, row) in rows.iter_mut().enumerate() {
                 *row = (after[j] - before[j]) * scale(model, &leg, 1);
             }
@@ -91,7 +90,13 @@ impl Constraint for JointSpeed {
             for after in 0..2 {
                 let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
                 for (j, jet) in jets(model, state, place, after).iter().enumerate() {
-                    reach::say_row(model, state, at, &(jet.first * scale), first + 2 * n + j, sink);
+                    foot_in_base::add_derivative(
+                        model,
+                        state,
+                        at,
+                        &(jet.first * scale),
+                        &mut sink.row(first + 2 * n + j),
+                    );
                 }
             }
         }
@@ -102,7 +107,7 @@ impl Constraint for JointSpeed {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (lambda, place) in multipliers.chunks_exact(2).zip(&self.places) {
@@ -110,14 +115,14 @@ impl Constraint for JointSpeed {
                 let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
                 let [thigh, knee] = jets(model, state, place, after);
                 let sum = thigh * (lambda[0] * scale) + knee * (lambda[1] * scale);
-                reach::say_quadratic(model, state, at, &sum.second, sink);
-                reach::say_curvature(model, state, at, &sum.first, curvature, sink);
+                foot_in_base::add_quadratic(model, state, at, &sum.second, sink);
+                foot_in_base::add_curvature(model, state, at, &sum.first, curvature, sink);
             }
         }
     }
 
-    fn place(&self, row: usize) -> Place {
+    fn place(&self, row: usize) -> RowPlace {
         let (i, [start, end], _) = self.places[row / 2];
-        Place { foot: Some(i), sample: 0.5 * (start.time() + end.time()) }
+        RowPlace { foot: Some(i), sample: 0.5 * (start.time() + end.time()) }
     }
 }

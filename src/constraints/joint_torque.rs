@@ -1,40 +1,40 @@
 //! The motors of a standing leg are strong enough for the planned force.
 //!
 //! ```text
-//!   −share ≤ (∂r/∂q)ᵀ Rᵀ f / torque_limit ≤ share,  r = Rᵀ(p_i − p)
+//!   −fraction ≤ (∂r/∂q)ᵀ Rᵀ f / torque_limit ≤ fraction,  r = Rᵀ(p_i − p)
 //! ```
 //!
 //! The torques of a leg without mass, see [`crate::leg`]. Legs of which the robot's file knows nothing have no rows.
 //!
-//! Rows: HAA, HFE, KFE for each free force; share of the limit.
+//! Rows: HAA, HFE, KFE for each free force; fraction of the limit.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::friction::{ForcePlace, force_places};
-use super::{Constraint, Place, reach};
+use super::margins;
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::contact_force::{ForceSample, force_samples};
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::foot_in_base;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
-
-/// Of the limit. The rest is for what the plan does not know: the weight of the legs, and the controller's corrections.
-const SHARE: f64 = 0.8;
 
 /// Torques of standing legs.
 #[derive(Clone, Debug)]
 pub struct JointTorque {
-    places: Vec<(ForcePlace, Leg)>,
+    places: Vec<(ForceSample, Leg)>,
 }
 
 impl JointTorque {
     /// For every force of a leg that is known.
     pub fn new(model: &Model) -> Self {
-        let all = force_places(model, |i| model.legs[i].is_some());
-        Self { places: all.into_iter().filter_map(|at| Some((at, model.legs[at.0]?))).collect() }
+        let all = force_samples(model, |i| model.legs[i].is_some());
+        Self { places: all.into_iter().filter_map(|at| Some((at, model.legs[at.foot]?))).collect() }
     }
 }
 
@@ -48,10 +48,10 @@ fn columns<T: Scalar>(model: &Model, leg: &Leg, r: [T; 3]) -> [[T; 3]; 3] {
 fn parts(
     model: &Model,
     state: &State,
-    (i, _, k): ForcePlace,
+    ForceSample { foot: i, sample: k, .. }: ForceSample,
     leg: &Leg,
 ) -> ([[Jet; 3]; 3], Vector3<f64>, Vector3<f64>) {
-    let columns = columns(model, leg, Jet::variables(&reach::value(model, state, (i, k))));
+    let columns = columns(model, leg, Jet::variables(&foot_in_base::value(model, state, (i, k))));
     let f = state.forces[i][k];
     (columns, state.base[k].rotation().tr_mul(&f), f)
 }
@@ -64,7 +64,7 @@ fn values(column: &[Jet; 3]) -> Vector3<f64> {
 fn tangents<'a>(
     model: &'a Model,
     state: &'a State,
-    (i, j, k): ForcePlace,
+    ForceSample { foot: i, stance: j, sample: k }: ForceSample,
 ) -> (Tangent<'a>, [Tangent<'a>; 2]) {
     let contact = &state.contacts[i][j];
     let foothold = &model.layout.feet[i].stances[j].foothold;
@@ -84,13 +84,15 @@ impl Constraint for JointTorque {
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(-SHARE);
-        upper.fill(SHARE);
+        lower.fill(-margins::JOINT_TORQUE);
+        upper.fill(margins::JOINT_TORQUE);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, &((i, _, k), leg)) in out.chunks_exact_mut(3).zip(&self.places) {
-            let columns = columns(model, &leg, reach::value(model, state, (i, k)).into());
+        for (rows, &(ForceSample { foot: i, sample: k, .. }, leg)) in
+            out.chunks_exact_mut(3).zip(&self.places)
+        {
+            let columns = columns(model, &leg, foot_in_base::value(model, state, (i, k)).into());
             let local = state.base[k].rotation().tr_mul(&state.forces[i][k]);
             for (row, column) in rows.iter_mut().zip(columns) {
                 *row = Vector3::from(column).dot(&local);
@@ -100,18 +102,18 @@ impl Constraint for JointTorque {
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (n, &(at, leg)) in self.places.iter().enumerate() {
-            let (i, _, k) = at;
+            let ForceSample { foot: i, sample: k, .. } = at;
             let (columns, local, f) = parts(model, state, at, &leg);
             let (turn, forces) = tangents(model, state, at);
             for (j, column) in columns.iter().enumerate() {
                 let row = first + 3 * n + j;
                 let by_r: Vector3<f64> = (0..3).map(|c| column[c].first * local[c]).sum();
-                reach::say_row(model, state, (i, k), &by_r, row, sink);
+                foot_in_base::add_derivative(model, state, (i, k), &by_r, &mut sink.row(row));
                 // d(Rᵀ f) = Rᵀ ([f] δ + df).
                 let world = state.base[k].rotation() * values(column);
-                turn.row(row, &-f.cross(&world), sink);
+                turn.add_along(&-f.cross(&world), &mut sink.row(row));
                 for force in &forces {
-                    force.row(row, &world, sink);
+                    force.add_along(&world, &mut sink.row(row));
                 }
             }
         }
@@ -122,19 +124,19 @@ impl Constraint for JointTorque {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (lambda, &(at, leg)) in multipliers.chunks_exact(3).zip(&self.places) {
-            let (i, _, k) = at;
+            let ForceSample { foot: i, sample: k, .. } = at;
             let (columns, local, f) = parts(model, state, at, &leg);
             let sum: [Jet; 3] = std::array::from_fn(|c| {
                 columns[0][c] * lambda[0] + columns[1][c] * lambda[1] + columns[2][c] * lambda[2]
             });
             // In r alone.
             let torque = sum[0] * local.x + sum[1] * local.y + sum[2] * local.z;
-            reach::say_quadratic(model, state, (i, k), &torque.second, sink);
-            reach::say_curvature(model, state, (i, k), &torque.first, curvature, sink);
+            foot_in_base::add_quadratic(model, state, (i, k), &torque.second, sink);
+            foot_in_base::add_curvature(model, state, (i, k), &torque.first, curvature, sink);
             // In Rᵀ f alone: λ · Rᵀ f.
             let r = state.base[k].rotation();
             let lambda = values(&sum);
@@ -148,15 +150,12 @@ impl Constraint for JointTorque {
             // In both: (change of r)ᵀ B (change of Rᵀ f), with R (change of r) = [arm] δ + dp_i − dp.
             let by_r = Matrix3::from_fn(|d, c| sum[c].first[d]);
             let form = r * by_r * r.transpose();
-            let foot = state.foot(model, i, k);
-            let base = &state.base[k];
-            let arm = cross_matrix(&(foot.point.position - base.position()));
-            let node = &model.layout.base[k];
-            for (by, tangent) in [
-                (arm.transpose(), turn),
-                (-Matrix3::identity(), Tangent::position(model, &base.point, node)),
-                (Matrix3::identity(), Tangent::position(model, &foot.point, state.foot_node(i, k))),
-            ] {
+            let at = (i, Instant::Sample(k));
+            let arm = cross_matrix(&foot_in_base::arm(model, state, at));
+            let [_, base, foot] = foot_in_base::tangents(model, state, at);
+            for (by, tangent) in
+                [(arm.transpose(), turn), (-Matrix3::identity(), base), (Matrix3::identity(), foot)]
+            {
                 tangent.cross(&(by * form * cross_matrix(&f)), &turn, sink);
                 for force in &forces {
                     tangent.cross(&(by * form), force, sink);
@@ -165,8 +164,7 @@ impl Constraint for JointTorque {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        let (i, _, k) = self.places[row / 3].0;
-        Place { foot: Some(i), sample: k as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        self.places[row / 3].0.place()
     }
 }

@@ -11,20 +11,21 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Place, distance, reach};
+use super::margins;
 use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::foot_in_base;
+use crate::nlp::ground_normal::distance;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
 /// Samples between two that are looked at.
 const STRIDE: usize = 2;
-/// For what happens between the samples, and the ground's curvature across the shank, m.
-const MARGIN: f64 = 0.02;
 
 /// Knees over the ground.
 #[derive(Clone, Debug)]
@@ -72,7 +73,7 @@ impl Moved {
         let q = base.position() + out;
         let by_r = Matrix3::from_fn(|c, d| local[c].first[d]);
         let with_foot = rotation * by_r * rotation.transpose();
-        let arm = cross_matrix(&reach::arm(model, state, (i, at)));
+        let arm = cross_matrix(&foot_in_base::arm(model, state, (i, at)));
         Self {
             local,
             distance: distance(&q, &model.ground.jet(q.x, q.y)),
@@ -90,13 +91,13 @@ impl Moved {
 impl KneeClearance {
     fn moved(&self, model: &Model, state: &State, place: usize) -> [Moved; 2] {
         let (i, at, leg) = &self.places[place];
-        let r = reach::value(model, state, (*i, *at));
+        let r = foot_in_base::value(model, state, (*i, *at));
         points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *at), local))
     }
 
     fn tangents<'a>(&self, model: &'a Model, state: &'a State, place: usize) -> [Tangent<'a>; 3] {
         let (i, at, _) = self.places[place];
-        reach::tangents(model, state, (i, at))
+        foot_in_base::tangents(model, state, (i, at))
     }
 }
 
@@ -111,14 +112,14 @@ impl Constraint for KneeClearance {
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         for (rows, (_, _, leg)) in lower.chunks_exact_mut(2).zip(&self.places) {
-            rows.copy_from_slice(&[leg.knee_radius + MARGIN, MARGIN]);
+            rows.copy_from_slice(&[leg.knee_radius + margins::KNEE_CLEARANCE, margins::KNEE_CLEARANCE]);
         }
         upper.fill(f64::INFINITY);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
         for (rows, (i, at, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let (base, r) = (state.base_at(*at), reach::value(model, state, (*i, *at)));
+            let (base, r) = (state.base_at(*at), foot_in_base::value(model, state, (*i, *at)));
             for (row, local) in rows.iter_mut().zip(points(leg, r.into())) {
                 let q = base.position() + base.rotation() * Vector3::from(local);
                 *row = distance(&q, &model.ground.jet(q.x, q.y)).0;
@@ -131,9 +132,9 @@ impl Constraint for KneeClearance {
             let [turn, base, foot] = self.tangents(model, state, place);
             for (j, moved) in self.moved(model, state, place).iter().enumerate() {
                 let (row, by_q) = (first + 2 * place + j, moved.distance.1);
-                turn.row(row, &moved.by_turn.tr_mul(&by_q), sink);
-                base.row(row, &moved.by_base().tr_mul(&by_q), sink);
-                foot.row(row, &moved.with_foot.tr_mul(&by_q), sink);
+                turn.add_along(&moved.by_turn.tr_mul(&by_q), &mut sink.row(row));
+                base.add_along(&moved.by_base().tr_mul(&by_q), &mut sink.row(row));
+                foot.add_along(&moved.with_foot.tr_mul(&by_q), &mut sink.row(row));
             }
         }
     }
@@ -143,7 +144,7 @@ impl Constraint for KneeClearance {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (place, lambda) in multipliers.chunks_exact(2).enumerate() {
@@ -171,14 +172,14 @@ impl Constraint for KneeClearance {
                 turn.cross(&-mixed, &base, sink);
                 let u = rotation.tr_mul(&w);
                 let sum = moved.local[0] * u.x + moved.local[1] * u.y + moved.local[2] * u.z;
-                reach::say_quadratic(model, state, (i, at), &sum.second, sink);
-                reach::say_curvature(model, state, (i, at), &sum.first, curvature, sink);
+                foot_in_base::add_quadratic(model, state, (i, at), &sum.second, sink);
+                foot_in_base::add_curvature(model, state, (i, at), &sum.first, curvature, sink);
             }
         }
     }
 
-    fn place(&self, row: usize) -> Place {
+    fn place(&self, row: usize) -> RowPlace {
         let (i, at, _) = self.places[row / 2];
-        Place { foot: Some(i), sample: at.time() }
+        RowPlace { foot: Some(i), sample: at.time() }
     }
 }

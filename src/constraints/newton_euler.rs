@@ -8,7 +8,7 @@
 //!
 //! with ZYX Euler angles (roll φ, pitch θ, yaw ψ). It asks for second derivatives of position and orientation in time, and in F
 //! those of 𝒫(J) are third derivatives of φ, which jump from cell to cell: so it serves the direct formulation only
-//! ([`crate::nlp::solve::validate`] says so). Forces and p̈ are both linear between samples there: Newton's law that holds
+//! ([`crate::planner::solve::validate`] says so). Forces and p̈ are both linear between samples there: Newton's law that holds
 //! at the samples holds everywhere.
 //!
 //! The rate of the angular momentum depends on nine numbers; dual numbers give its derivatives.
@@ -19,12 +19,12 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use num_dual::{DualNum, hessian, jacobian};
 
 use super::dynamics::Dynamics;
-use super::{Constraint, Place};
 use crate::nlp::Model;
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::State;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::trajectory::LinearNode;
 
 /// (roll, pitch, yaw), their rates and second derivatives.
@@ -129,7 +129,7 @@ impl Constraint for NewtonEuler {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         self.wrench.hessian(model, state, multipliers, curvature, sink);
@@ -153,7 +153,7 @@ impl Constraint for NewtonEuler {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
+    fn place(&self, row: usize) -> RowPlace {
         self.wrench.place(row)
     }
 }

@@ -7,11 +7,12 @@
 //!
 //! Rows: one for each free force, in m g; as in [`super::friction`] for the full one.
 
-use super::friction::{ForcePlace, force_places, say_blocks, with_tangents};
-use super::{Constraint, Normal, Place};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::contact_force::{ForceSample, ForceTangents, force_samples};
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::ground_normal::GroundNormal;
 use crate::nlp::model::LEAST_NORMAL_FORCE;
 use crate::nlp::sink::Sink;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 
 /// Normal forces within limits.
@@ -19,13 +20,13 @@ use crate::nlp::{Model, State};
 pub struct NormalForce {
     force_limit: f64,
     pull_limit: f64,
-    places: Vec<ForcePlace>,
+    samples: Vec<ForceSample>,
 }
 
 impl NormalForce {
     /// For all feet.
     pub fn new(model: &Model, force_limit: f64, pull_limit: f64) -> Self {
-        Self { force_limit, pull_limit, places: force_places(model, |_| true) }
+        Self { force_limit, pull_limit, samples: force_samples(model, |_| true) }
     }
 }
 
@@ -35,32 +36,32 @@ impl Constraint for NormalForce {
     }
 
     fn rows(&self) -> usize {
-        self.places.len()
+        self.samples.len()
     }
 
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        for (r, &(i, ..)) in self.places.iter().enumerate() {
-            lower[r] = if model.adhesive[i] { -self.pull_limit } else { LEAST_NORMAL_FORCE };
+        for (r, at) in self.samples.iter().enumerate() {
+            lower[r] = if model.adhesive[at.foot] { -self.pull_limit } else { LEAST_NORMAL_FORCE };
             upper[r] = self.force_limit;
         }
     }
 
     fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
-        for (value, &(i, j, k)) in out.iter_mut().zip(&self.places) {
-            *value = Normal::new(&state.contacts[i][j].ground).n.dot(&state.full_forces[i][k]);
+        for (value, at) in out.iter_mut().zip(&self.samples) {
+            let normal = GroundNormal::new(&state.contacts[at.foot][at.stance].ground);
+            *value = normal.n.dot(&state.full_forces[at.foot][at.sample]);
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (r, &place) in self.places.iter().enumerate() {
-            let (i, j, k) = place;
-            let normal = Normal::new(&state.contacts[i][j].ground);
-            let (_, by_position) = normal.along(&state.full_forces[i][k]);
-            with_tangents(model, state, place, |force, by_foothold, position| {
-                force.row(first + r, &normal.n, sink);
-                by_foothold.row(first + r, &normal.n, sink);
-                position.row(first + r, &by_position, sink);
-            });
+        for (r, &at) in self.samples.iter().enumerate() {
+            let normal = GroundNormal::new(&state.contacts[at.foot][at.stance].ground);
+            let (_, by_position) = normal.along(&state.full_forces[at.foot][at.sample]);
+            let tangents = ForceTangents::new(model, state, at);
+            let mut row = sink.row(first + r);
+            tangents.force.add_along(&normal.n, &mut row);
+            tangents.by_foothold.add_along(&normal.n, &mut row);
+            tangents.foothold.add_along(&by_position, &mut row);
         }
     }
 
@@ -69,23 +70,21 @@ impl Constraint for NormalForce {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
-        for (&lambda, &place) in multipliers.iter().zip(&self.places) {
-            let (i, j, k) = place;
-            let normal = Normal::new(&state.contacts[i][j].ground);
-            let f = state.full_forces[i][k];
+        for (&lambda, &at) in multipliers.iter().zip(&self.samples) {
+            let normal = GroundNormal::new(&state.contacts[at.foot][at.stance].ground);
+            let f = state.full_forces[at.foot][at.sample];
             let (_, by_position) = normal.along(&f);
-            curvature.full_forces[i][k] += normal.n * lambda;
-            curvature.contacts[i][j] += by_position * lambda;
+            curvature.full_forces[at.foot][at.sample] += normal.n * lambda;
+            curvature.contacts[at.foot][at.stance] += by_position * lambda;
             let (fp, pp) = (normal.jacobian() * lambda, normal.curvature(&f) * lambda);
-            say_blocks(model, state, place, None, &fp, &pp, sink);
+            ForceTangents::new(model, state, at).add_blocks(None, &fp, &pp, sink);
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        let (i, _, k) = self.places[row];
-        Place { foot: Some(i), sample: k as f64 }
+    fn place(&self, row: usize) -> RowPlace {
+        self.samples[row].place()
     }
 }

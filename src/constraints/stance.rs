@@ -9,10 +9,11 @@
 //!
 //! Rows: one a stance, m.
 
-use super::{Constraint, Place, height_form};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::ground_normal::height_form;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 
 /// Footholds on the ground.
@@ -65,7 +66,8 @@ impl Constraint for OnGround {
         for (r, &(i, j)) in self.places.iter().enumerate() {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
-            Tangent::position(model, &contact.point, node).row(first + r, &contact.gap().1, sink);
+            Tangent::position(model, &contact.point, node)
+                .add_along(&contact.gap().1, &mut sink.row(first + r));
         }
     }
 
@@ -74,7 +76,7 @@ impl Constraint for OnGround {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (&lambda, &(i, j)) in multipliers.iter().zip(&self.places) {
@@ -86,7 +88,7 @@ impl Constraint for OnGround {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
-        Place { foot: Some(self.places[row].0), sample: self.samples[row] }
+    fn place(&self, row: usize) -> RowPlace {
+        RowPlace { foot: Some(self.places[row].0), sample: self.samples[row] }
     }
 }

@@ -7,18 +7,19 @@
 //! The left side is the distance to the tangent plane of the ground below the foot. In the middle of a swing the clearance
 //! is the scenario's `swing_clearance`; at the samples before and after it a share of it that falls off towards both ends
 //! like the parabola 4u(1−u), so that feet leave and land steeply enough to pass stones. In the space of the variables the
-//! free control points are bounded as well where that is sound (see `nlp::problem`).
+//! free control points are bounded as well where that is sound (see `planner::problem`).
 //!
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
 //! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Constraint, Place, distance};
-use crate::nlp::curvature::Curvature;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::ground_normal::distance;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::{FootNode, swing_points};
 use crate::nlp::tangent::Tangent;
+use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;
@@ -103,7 +104,8 @@ impl Constraint for SwingClearance {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::position(model, &foot.point, node).row(first + r, &self.distance(state, at).1, sink);
+            Tangent::position(model, &foot.point, node)
+                .add_along(&self.distance(state, at).1, &mut sink.row(first + r));
         }
     }
 
@@ -112,7 +114,7 @@ impl Constraint for SwingClearance {
         model: &Model,
         state: &State,
         multipliers: &[f64],
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for (&lambda, &at) in multipliers.iter().zip(&self.places) {
@@ -126,10 +128,10 @@ impl Constraint for SwingClearance {
         }
     }
 
-    fn place(&self, row: usize) -> Place {
+    fn place(&self, row: usize) -> RowPlace {
         match self.places[row] {
-            At::Sample { foot, k, .. } => Place { foot: Some(foot), sample: k as f64 },
-            At::Point { foot, sample, .. } => Place { foot: Some(foot), sample },
+            At::Sample { foot, k, .. } => RowPlace { foot: Some(foot), sample: k as f64 },
+            At::Point { foot, sample, .. } => RowPlace { foot: Some(foot), sample },
         }
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! Exact up to the trapezoidal rule: the base's acceleration is linear between the samples, and linear in the variables.
 
-use super::Cost;
-use crate::nlp::curvature::Curvature;
-use crate::nlp::sink::Sink;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::sink::{Differential, Gradient, Sink};
+use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 
 /// A base that moves evenly.
@@ -30,10 +30,10 @@ impl Cost for BaseAcceleration {
         0.5 * self.weight * squares.sum::<f64>()
     }
 
-    fn gradient(&self, model: &Model, state: &State, _x: &[f64], sink: &mut Sink) {
+    fn gradient(&self, model: &Model, state: &State, _x: &[f64], gradient: &mut Gradient) {
         for ([_, node], [_, _, acceleration]) in model.layout.base_rates.iter().zip(&state.base_motion) {
             for (d, value) in acceleration.iter().enumerate() {
-                sink.node(0, node, d, self.weight * value);
+                gradient.node(node, d, self.weight * value);
             }
         }
     }
@@ -44,7 +44,7 @@ impl Cost for BaseAcceleration {
         _state: &State,
         _x: &[f64],
         factor: f64,
-        _curvature: &mut Curvature,
+        _curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for [_, node] in &model.layout.base_rates {

@@ -6,9 +6,9 @@
 
 use nalgebra::Vector3;
 
-use super::Cost;
-use crate::nlp::curvature::Curvature;
-use crate::nlp::sink::Sink;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::sink::{Differential, Gradient, Sink};
+use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 
@@ -72,21 +72,21 @@ impl Cost for ForceRate {
         0.5 * self.weight * (sum + FULL_SHARE * full)
     }
 
-    fn gradient(&self, model: &Model, state: &State, _x: &[f64], sink: &mut Sink) {
+    fn gradient(&self, model: &Model, state: &State, _x: &[f64], gradient: &mut Gradient) {
         for &(i, k) in &self.intervals {
             let change = Self::change(state, (i, k)) * self.weight;
             for (sample, sign) in [(k, -1.0), (k + 1, 1.0)] {
                 let Some((_, node)) = state.force_node(model, i, sample) else { continue };
                 for d in 0..3 {
-                    sink.node(0, node, d, sign * change[d]);
+                    gradient.node(node, d, sign * change[d]);
                 }
             }
         }
         for (at, [before, after]) in self.full_nodes(model) {
             let change = Self::full_change(state, at) * (FULL_SHARE * self.weight);
             for d in 0..3 {
-                sink.node(0, before, d, -change[d]);
-                sink.node(0, after, d, change[d]);
+                gradient.node(before, d, -change[d]);
+                gradient.node(after, d, change[d]);
             }
         }
     }
@@ -97,7 +97,7 @@ impl Cost for ForceRate {
         state: &State,
         _x: &[f64],
         factor: f64,
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         let weight = factor * self.weight;

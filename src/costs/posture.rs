@@ -4,10 +4,10 @@
 
 use nalgebra::Matrix3;
 
-use super::Cost;
-use crate::constraints::reach;
-use crate::nlp::curvature::Curvature;
-use crate::nlp::sink::Sink;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::foot_in_base;
+use crate::nlp::sink::{Gradient, Sink};
+use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 
 /// Footholds near the nominal ones.
@@ -46,15 +46,15 @@ impl Cost for Posture {
 
     fn value(&self, model: &Model, state: &State, _x: &[f64]) -> f64 {
         let square = |place: (usize, usize)| {
-            (reach::value(model, state, place) - model.nominal[place.0]).norm_squared()
+            (foot_in_base::value(model, state, place) - model.nominal[place.0]).norm_squared()
         };
         self.places.iter().map(|&place| 0.5 * self.weight * square(place)).sum()
     }
 
-    fn gradient(&self, model: &Model, state: &State, _x: &[f64], sink: &mut Sink) {
+    fn gradient(&self, model: &Model, state: &State, _x: &[f64], gradient: &mut Gradient) {
         for &place in &self.places {
-            let error = reach::value(model, state, place) - model.nominal[place.0];
-            reach::say_row(model, state, place, &(error * self.weight), 0, sink);
+            let error = foot_in_base::value(model, state, place) - model.nominal[place.0];
+            foot_in_base::add_derivative(model, state, place, &(error * self.weight), gradient);
         }
     }
 
@@ -64,14 +64,14 @@ impl Cost for Posture {
         state: &State,
         _x: &[f64],
         factor: f64,
-        curvature: &mut Curvature,
+        curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         let weight = factor * self.weight;
         for &(i, k) in &self.places {
-            let error = reach::value(model, state, (i, k)) - model.nominal[i];
-            reach::say_curvature(model, state, (i, k), &(error * weight), curvature, sink);
-            reach::say_quadratic(model, state, (i, k), &(Matrix3::identity() * weight), sink);
+            let error = foot_in_base::value(model, state, (i, k)) - model.nominal[i];
+            foot_in_base::add_curvature(model, state, (i, k), &(error * weight), curvature, sink);
+            foot_in_base::add_quadratic(model, state, (i, k), &(Matrix3::identity() * weight), sink);
         }
     }
 }

@@ -9,9 +9,9 @@
 
 use nalgebra::Vector3;
 
-use super::Cost;
-use crate::nlp::curvature::Curvature;
-use crate::nlp::sink::Sink;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::sink::{Differential, Gradient, Sink};
+use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::spline::SWING_INTERVALS;
@@ -19,12 +19,12 @@ use crate::trajectory::spline::SWING_INTERVALS;
 /// Feet that swing evenly.
 #[derive(Clone, Debug)]
 pub struct SwingAcceleration {
-    swings: Vec<Swing>,
+    swings: Vec<WeightedSwing>,
     time_step: f64,
 }
 
 #[derive(Clone, Debug)]
-struct Swing {
+struct WeightedSwing {
     foot: usize,
     swing: usize,
     /// Its lift-off, if it is a variable; touch-down is the next one.
@@ -45,14 +45,14 @@ impl SwingAcceleration {
                     let node = layout.swing_node(foot, swing, knot as f64 / SWING_INTERVALS as f64, 2);
                     (node, 2.0 * weight * share / SWING_INTERVALS as f64)
                 });
-                swings.push(Swing { foot, swing, switches: s.switches, knots: knots.collect() });
+                swings.push(WeightedSwing { foot, swing, switches: s.switches, knots: knots.collect() });
             }
         }
         Self { swings, time_step: layout.time_step }
     }
 
     /// T⁻³ and its first and second derivatives with respect to touch-down; those with respect to lift-off have a minus each.
-    fn factor(&self, state: &State, swing: &Swing) -> [f64; 3] {
+    fn factor(&self, state: &State, swing: &WeightedSwing) -> [f64; 3] {
         let [a, b] = state.switches[swing.foot][swing.swing];
         let duration = (b - a) * self.time_step;
         let value = duration.powi(-3);
@@ -62,7 +62,7 @@ impl SwingAcceleration {
 }
 
 /// Σ ½ w ‖S''‖²
-fn sum(swing: &Swing, x: &[f64]) -> f64 {
+fn sum(swing: &WeightedSwing, x: &[f64]) -> f64 {
     let square = |node: &LinearNode| Vector3::from(node.value::<3>(x)).norm_squared();
     swing.knots.iter().map(|(node, weight)| 0.5 * weight * square(node)).sum()
 }
@@ -76,18 +76,18 @@ impl Cost for SwingAcceleration {
         self.swings.iter().map(|swing| self.factor(state, swing)[0] * sum(swing, x)).sum()
     }
 
-    fn gradient(&self, _model: &Model, state: &State, x: &[f64], sink: &mut Sink) {
+    fn gradient(&self, _model: &Model, state: &State, x: &[f64], gradient: &mut Gradient) {
         for swing in &self.swings {
             let [value, slope, _] = self.factor(state, swing);
             for (node, weight) in &swing.knots {
                 for (d, y) in node.value::<3>(x).into_iter().enumerate() {
-                    sink.node(0, node, d, value * weight * y);
+                    gradient.node(node, d, value * weight * y);
                 }
             }
             if let Some(switches) = swing.switches {
                 let sum = sum(swing, x);
-                sink.add(0, switches, -slope * sum);
-                sink.add(0, switches + 1, slope * sum);
+                gradient.add(switches, -slope * sum);
+                gradient.add(switches + 1, slope * sum);
             }
         }
     }
@@ -98,7 +98,7 @@ impl Cost for SwingAcceleration {
         state: &State,
         x: &[f64],
         factor: f64,
-        _curvature: &mut Curvature,
+        _curvature: &mut NodeCurvature,
         sink: &mut Sink,
     ) {
         for swing in &self.swings {

@@ -1,5 +1,5 @@
-//! Second derivatives that are due to the nodes themselves: every term of the Lagrangian says how it depends on the ambient quantities, and
-//! once all have, the nodes' own second derivatives are said with these weights.
+//! Second derivatives of the nodes themselves. Every term of the Lagrangian accumulates its derivatives with respect to the
+//! ambient quantities; once all have, the nodes' own second derivatives are added with these weights.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +14,7 @@ use crate::trajectory::{Instant, LinearNode};
 
 /// ∂L/∂(ambient quantities) of a Lagrangian term: the weights of the nodes' own second derivatives.
 #[derive(Clone, Debug)]
-pub struct Curvature {
+pub struct NodeCurvature {
     /// ∂L/∂p by sample.
     pub base_position: Vec<Vector3<f64>>,
     /// ∂L/∂R by sample.
@@ -37,8 +37,8 @@ pub struct Curvature {
     pub warped_forces: Vec<Vec<Vector3<f64>>>,
 }
 
-impl Curvature {
-    /// Number of parts of [`Self::say`].
+impl NodeCurvature {
+    /// Number of parts of [`Self::scatter`].
     pub const PARTS: usize = 3;
 
     /// All zero.
@@ -125,30 +125,30 @@ impl Curvature {
         }
     }
 
-    /// Says part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
+    /// Adds part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
     /// base, 1 what is due to switches, 2 the feet.
-    pub fn say(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
+    pub fn scatter(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
         match part {
-            0 => self.say_bases(model, state, sink),
-            1 => self.say_switches(model, state, sink),
-            _ if model.space.is_warped() => self.say_feet(model, state, sink),
+            0 => self.scatter_bases(model, state, sink),
+            1 => self.scatter_switches(model, state, sink),
+            _ if model.space.is_warped() => self.scatter_feet(model, state, sink),
             _ => {}
         }
     }
 
-    fn say_bases(&self, model: &Model, state: &State, sink: &mut Sink) {
+    fn scatter_bases(&self, model: &Model, state: &State, sink: &mut Sink) {
         let layout = &model.layout;
         for (k, base) in state.base.iter().enumerate() {
-            say_base(model, base, &layout.base[k], &self.base_position[k], &self.base_rotation[k], sink);
+            scatter_base(model, base, &layout.base[k], &self.base_position[k], &self.base_rotation[k], sink);
         }
         for (k, base) in state.base_between.iter().enumerate() {
             let (position, rotation) = &self.base_between[k];
-            say_base(model, base, &layout.base_between[k], position, rotation, sink);
+            scatter_base(model, base, &layout.base_between[k], position, rotation, sink);
         }
     }
 
     /// The part of the feet and forces that is due to φ.
-    fn say_feet(&self, model: &Model, state: &State, sink: &mut Sink) {
+    fn scatter_feet(&self, model: &Model, state: &State, sink: &mut Sink) {
         let layout = &model.layout;
         let position = |sink: &mut Sink, node: &LinearNode, point: &PointJet, weight: &Vector3<f64>| {
             for d in 0..3 {
@@ -208,31 +208,31 @@ impl Curvature {
     }
 
     /// The part that is due to nodes whose weights depend on switches.
-    fn say_switches(&self, model: &Model, state: &State, sink: &mut Sink) {
+    fn scatter_switches(&self, model: &Model, state: &State, sink: &mut Sink) {
         let layout = &model.layout;
         for i in 0..layout.feet.len() {
             for (k, timed) in state.foot_nodes[i].iter().enumerate().filter(|(_, t)| t.is_timed()) {
                 let weight = state.swings[i][k].point.jacobian.tr_mul(&self.swings[i][k]);
-                say_timed(timed, &weight, sink);
+                scatter_timed(timed, &weight, sink);
             }
             let between = state.foot_nodes_between[i].iter().enumerate();
             for (k, timed) in between.filter(|(_, t)| t.is_timed()) {
                 let jacobian = &state.swings_between[i][k].point.jacobian;
-                say_timed(timed, &jacobian.tr_mul(&self.swings_between[i][k]), sink);
+                scatter_timed(timed, &jacobian.tr_mul(&self.swings_between[i][k]), sink);
             }
             for (k, timed) in state.force_nodes[i].iter().enumerate() {
                 let Some(timed) = timed.as_ref().filter(|t| t.is_timed()) else { continue };
                 let Some((j, _)) = layout.force(i, k) else { continue };
                 let jacobian = &state.contacts[i][j].point.jacobian;
                 let weight = jacobian.tr_mul(&self.forces[i][k]) + self.warped_forces[i][k];
-                say_timed(timed, &weight, sink);
+                scatter_timed(timed, &weight, sink);
             }
         }
     }
 }
 
-/// Says ∂L/∂p · ∂²p and ⟨∂L/∂R, ∂²R⟩ of the base.
-fn say_base(
+/// Adds ∂L/∂p · ∂²p and ⟨∂L/∂R, ∂²R⟩ of the base.
+fn scatter_base(
     model: &Model,
     base: &BaseNode,
     node: &LinearNode,
@@ -257,8 +257,8 @@ fn say_base(
     }
 }
 
-/// Says weight · ∂²y of a node y whose weights depend on switches.
-fn say_timed(timed: &TimedNode, weight: &Vector3<f64>, sink: &mut Sink) {
+/// Adds weight · ∂²y of a node y whose weights depend on switches.
+fn scatter_timed(timed: &TimedNode, weight: &Vector3<f64>, sink: &mut Sink) {
     for (t, &(switch, _)) in timed.node.times.iter().enumerate() {
         for (m, &(variable, _)) in timed.node.terms.iter().enumerate() {
             for d in 0..3 {

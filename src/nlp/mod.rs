@@ -1,25 +1,33 @@
-//! The nonlinear program: nodes → constraints and costs → Ipopt.
+//! The language in which constraints and costs are written.
 //!
 //! ```text
 //! x ──linear──▶ nodes in the space of the variables ──φ, 𝒫──▶ ambient nodes ──constraints, costs──▶ g(x), f(x)
-//!              (trajectory::layout)                           (nlp::state)     (constraints, costs)
+//!              (trajectory::layout)                           (state)         (crate::constraints, crate::costs)
 //! ```
 //!
 //! A constraint sees ambient quantities alone; which space the variables live in changes only how the nodes are pushed
 //! forward. So the two formulations differ in nothing else.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | [`model`] | what stays the same during a solve |
+//! | [`state`] | the ambient nodes at the present x |
+//! | [`term`] | what a constraint and a cost have to provide |
+//! | [`sink`] | where they put their derivatives |
+//! | [`tangent`] | how ambient vectors change with the variables |
+//! | [`curvature`] | the second derivatives of the nodes themselves |
+//! | [`foot_in_base`], [`contact_force`], [`ground_normal`] | quantities that several of them are functions of |
 
+pub mod contact_force;
 pub mod curvature;
-pub mod derivatives;
-pub mod guess;
+pub mod foot_in_base;
+pub mod ground_normal;
 pub mod model;
-pub mod problem;
-mod share;
 pub mod sink;
-pub mod solve;
 pub mod state;
 pub mod tangent;
-pub mod violation;
+pub mod term;
 
 pub use model::Model;
-pub use problem::Problem;
 pub use state::State;
+pub use term::{Constraint, Cost};

@@ -22,9 +22,6 @@ pub const CONE_ROUNDING: f64 = 2e-3;
 /// Least normal force of a standing foot that does not adhere, in m g, away from the switches.
 pub const LEAST_NORMAL_FORCE: f64 = 0.02;
 
-/// Length of a gait's cycle, s, where neither scenario nor robot name one.
-const CYCLE: f64 = 1.0;
-
 /// Points of the torso's underside at which its clearance is asked for, along x and y.
 pub const UNDERSIDE: [usize; 2] = [5, 3];
 
@@ -57,20 +54,16 @@ pub struct Model {
     pub threads: usize,
 }
 
-/// The gait of a scenario, for a robot.
-///
-/// # Errors
-/// For a gait that the robot, the horizon or the time step does not allow, or whose durations cannot be optimized.
-pub fn gait(scenario: &Scenario, robot: &Robot) -> Result<Gait> {
-    let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
-    Gait::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
-}
-
 impl Model {
     /// Puts a scenario together.
-    pub fn new(scenario: &Scenario, robot: &Robot, ground: Arc<Heightfield>, space: Space) -> Result<Self> {
+    pub fn new(
+        scenario: &Scenario,
+        robot: &Robot,
+        gait: &Gait,
+        ground: Arc<Heightfield>,
+        space: Space,
+    ) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
-        let gait = gait(scenario, robot)?;
         let adhesive_feet = &scenario.robot.adhesive_feet;
         if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
             return Err(Error::input(format!(
@@ -106,7 +99,7 @@ impl Model {
             space,
             threads: scenario.solver.threads,
             layout: Layout::new(
-                &gait,
+                gait,
                 scenario.time_step,
                 KnotSpacing {
                     base: scenario.discretization.base_knots,

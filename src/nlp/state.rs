@@ -180,9 +180,9 @@ impl State {
                     self.full_forces[i][k] = contact.point.jacobian * full;
                     if let Some(timed) = &mut self.force_nodes[i][k] {
                         timed.update(&self.basis, x);
-                        let share = timed.share();
-                        self.warped_forces[i][k] = full * share;
-                        self.forces[i][k] = self.full_forces[i][k] * share;
+                        let activation = timed.activation();
+                        self.warped_forces[i][k] = full * activation;
+                        self.forces[i][k] = self.full_forces[i][k] * activation;
                     }
                 }
             }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::model::Model;
-use super::sink::Sink;
+use super::sink::{Differential, Sink};
 use super::state::{BaseNode, FootNode};
 use crate::trajectory::LinearNode;
 use crate::trajectory::space::PointJet;
@@ -60,23 +60,23 @@ impl<'a> Tangent<'a> {
         Self { node, columns, first: 0, last: 3, identity }
     }
 
-    /// Says the derivatives of a row that changes by `by` · (change of the vector).
-    pub fn row(&self, row: usize, by: &Vector3<f64>, sink: &mut Sink) {
+    /// Adds the derivatives of a scalar that changes by `by` · (change of the vector).
+    pub fn add_along(&self, by: &Vector3<f64>, scalar: &mut impl Differential) {
         for d in self.first..self.last {
-            sink.node(row, self.node, d, by.dot(&self.columns[d]));
+            scalar.node(self.node, d, by.dot(&self.columns[d]));
         }
     }
 
-    /// Says the derivatives of a row that changes by `scale` times the change of component `c` of the vector.
-    pub fn component(&self, row: usize, c: usize, scale: f64, sink: &mut Sink) {
+    /// Adds the derivatives of a scalar that changes by `scale` times the change of component `c` of the vector.
+    pub fn add_component(&self, c: usize, scale: f64, scalar: &mut impl Differential) {
         for d in self.first..self.last {
             if !self.identity || c == d {
-                sink.node(row, self.node, d, scale * self.columns[d][c]);
+                scalar.node(self.node, d, scale * self.columns[d][c]);
             }
         }
     }
 
-    /// Says the second derivatives of the bilinear form aᵀ B b in the changes a of this vector and b of another.
+    /// Adds the second derivatives of the bilinear form aᵀ B b in the changes a of this vector and b of another.
     pub fn cross(&self, form: &Matrix3<f64>, other: &Tangent, sink: &mut Sink) {
         for d in self.first..self.last {
             let left = form.tr_mul(&self.columns[d]);
@@ -86,7 +86,7 @@ impl<'a> Tangent<'a> {
         }
     }
 
-    /// Says the second derivatives of the quadratic form ½ aᵀ Q a in the change a of this vector, Q symmetric.
+    /// Adds the second derivatives of the quadratic form ½ aᵀ Q a in the change a of this vector, Q symmetric.
     pub fn quadratic(&self, form: &Matrix3<f64>, sink: &mut Sink) {
         for d in self.first..self.last {
             let left = form * self.columns[d];

@@ -2,11 +2,11 @@
 
 use super::{NamedArray, Plan};
 use crate::heightfield::Heightfield;
-use crate::trajectory::gait::{Gait, Swing};
 use crate::trajectory::layout::Layout;
 use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
 use crate::trajectory::space::Space;
 use crate::trajectory::switches::snapped;
+use crate::trajectory::{Gait, Swing};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 

@@ -1,7 +1,6 @@
 //! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
 
 pub mod exact;
-pub mod npz;
 mod read;
 pub mod sampled;
 mod write;
@@ -10,7 +9,9 @@ pub use read::PLAN_SCHEMA;
 
 use serde::{Deserialize, Serialize};
 
+use crate::planner::Seconds;
 use crate::robot::Box3;
+use crate::warp::MapGrid;
 
 /// Name, shape, values in C order.
 pub type NamedArray = (String, Vec<usize>, Vec<f64>);
@@ -98,19 +99,6 @@ pub struct GroundGrid {
     pub raw: Option<Vec<f64>>,
 }
 
-/// The warp map as stored.
-#[derive(Clone, Debug)]
-pub struct MapGrid {
-    /// (Nx+3, Ny+3, Nz+3)
-    pub shape: [usize; 3],
-    /// (shape, 3) in C order, m.
-    pub control_points: Vec<[f64; 3]>,
-    /// Corner of the box in F, m.
-    pub origin: [f64; 3],
-    /// Knots by axis, m.
-    pub knots: [Vec<f64>; 3],
-}
-
 /// The `meta` member of a plan.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meta {
@@ -124,10 +112,13 @@ pub struct Meta {
     pub formulation: String,
     /// Samples a second.
     pub sample_rate_hz: f64,
-    /// The whole scenario file.
+    /// The whole scenario, overrides included, as TOML.
     pub scenario: String,
     /// The robot as planned with.
     pub robot: MetaRobot,
+    /// The limits as planned with; missing in plans of version 0.1.0 and before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<MetaLimits>,
     /// How the solve went.
     pub solver: MetaSolver,
     /// What the check said.
@@ -155,6 +146,23 @@ pub struct MetaRobot {
     pub torso: Box3,
 }
 
+/// `meta.limits`: what the scenario sets, defaults included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MetaLimits {
+    /// Largest normal force of a foot, in m g.
+    pub force_limit: f64,
+    /// Largest pull of an adhesive foot, in m g.
+    pub pull_limit: f64,
+    /// Least apex of a swing above the ground, m.
+    pub swing_clearance: f64,
+    /// Least distance of the torso's underside from the ground, m.
+    pub base_clearance: f64,
+    /// Friction coefficient ν.
+    pub friction: f64,
+    /// Fraction of ν that the plan leaves unused.
+    pub friction_margin: f64,
+}
+
 /// `meta.solver`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MetaSolver {
@@ -168,21 +176,6 @@ pub struct MetaSolver {
     pub max_violation: f64,
     /// Where the time went.
     pub seconds: Seconds,
-}
-
-/// `meta.solver.seconds`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Seconds {
-    /// Building the map.
-    pub map: f64,
-    /// Building the guess.
-    pub guess: f64,
-    /// Evaluating the NLP.
-    pub evaluation: f64,
-    /// Everything else in Ipopt.
-    pub linear_solver: f64,
-    /// All of it.
-    pub total: f64,
 }
 
 /// One law, as checked.

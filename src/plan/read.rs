@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::npz::NpzReader;
-use super::{GroundGrid, MapGrid, Meta, NamedArray, Plan, WarpedSamples};
+use super::{GroundGrid, Meta, NamedArray, Plan, WarpedSamples};
 use crate::Result;
+use crate::files::npz::NpzReader;
+use crate::warp::MapGrid;
 
 /// The newest plan that this reader knows.
 pub const PLAN_SCHEMA: u32 = 1;

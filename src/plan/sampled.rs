@@ -5,9 +5,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 
-use super::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan, Seconds, WarpedSamples};
+use super::{GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, Plan, WarpedSamples};
 use crate::nlp::model::GRAVITY;
-use crate::nlp::solve::Motion;
+use crate::planner::{Motion, Seconds};
 use crate::robot::Robot;
 use crate::scenario::{Formulation, Scenario};
 use crate::terrain::Ground;
@@ -150,6 +150,14 @@ impl Plan {
                     reach: model.reach.clone(),
                     torso: robot.torso,
                 },
+                limits: Some(MetaLimits {
+                    force_limit: scenario.motion.force_limit,
+                    pull_limit: scenario.motion.pull_limit,
+                    swing_clearance: scenario.motion.swing_clearance,
+                    base_clearance: scenario.motion.base_clearance,
+                    friction: scenario.contact.friction,
+                    friction_margin: scenario.contact.friction_margin,
+                }),
                 solver: MetaSolver {
                     status: motion.status.clone(),
                     success: motion.solved,

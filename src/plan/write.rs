@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::npz::NpzWriter;
-use super::{MapGrid, Plan};
+use super::Plan;
+use crate::files::npz::NpzWriter;
+use crate::warp::MapGrid;
 use crate::{Error, Result};
 
 impl Plan {

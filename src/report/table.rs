@@ -1,9 +1,9 @@
 //! Aligned tables for the terminal.
 
 use crate::check::CheckReport;
-use crate::nlp::derivatives::DerivativeError;
-use crate::nlp::violation::BlockViolation;
 use crate::plan::CheckRow;
+use crate::planner::derivatives::DerivativeError;
+use crate::planner::violation::BlockViolation;
 use crate::warp::{Distribution, MapReport};
 
 /// A table with a header; columns of numbers are set flush right.

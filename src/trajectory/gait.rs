@@ -2,54 +2,14 @@
 //! where the base's acceleration has its own. With `gait.optimize_durations` they may leave it, each within a room of its
 //! own; see [`super::switches`].
 
+use super::phase::{Stance, Swing};
 use super::switches;
+use crate::robot::Robot;
 use crate::scenario::{GaitKind, Scenario};
 use crate::{Error, Result};
 
 /// Standing at the start and at the end, s.
 const STAND: f64 = 0.3;
-
-/// A time during which a foot stands, in samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stance {
-    /// Touch-down (force zero, unless the motion starts here).
-    pub start: f64,
-    /// Lift-off (force zero, unless the motion ends here).
-    pub end: f64,
-}
-
-/// A time during which a foot moves, in samples; both ends belong to a stance as well.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Swing {
-    /// Lift-off.
-    pub start: f64,
-    /// Touch-down.
-    pub end: f64,
-    /// How far lift-off and touch-down may move to either side; zero where they are given.
-    pub room: [f64; 2],
-}
-
-impl Swing {
-    /// With given ends.
-    pub fn given(start: f64, end: f64) -> Self {
-        Self { start, end, room: [0.0; 2] }
-    }
-
-    /// Whether its ends are variables.
-    pub fn is_free(&self) -> bool {
-        self.room != [0.0; 2]
-    }
-
-    /// The samples at which the foot moves, or may move, lie strictly between these.
-    pub fn span(&self) -> [f64; 2] {
-        [self.start - self.room[0], self.end + self.room[1]]
-    }
-
-    /// Time between its nominal ends; forces before it belong to the stance before.
-    pub fn middle(&self) -> f64 {
-        0.5 * (self.start + self.end)
-    }
-}
 
 /// Swings by foot, in order of time.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,7 +20,19 @@ pub struct Gait {
     pub swings: Vec<Vec<Swing>>,
 }
 
+/// Length of a gait's cycle, s, where neither scenario nor robot name one.
+const CYCLE: f64 = 1.0;
+
 impl Gait {
+    /// The gait of a scenario for its robot.
+    ///
+    /// # Errors
+    /// For a gait that the robot, the horizon or the time step does not allow, or whose durations cannot be optimized.
+    pub fn of(scenario: &Scenario, robot: &Robot) -> Result<Self> {
+        let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
+        Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
+    }
+
     /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom); `cycle` is the
     /// length of a cycle, s, where the scenario names none.
     pub fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {

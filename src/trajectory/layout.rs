@@ -13,9 +13,10 @@
 
 use std::ops::Range;
 
-use super::gait::{Gait, Stance, Swing};
+use super::gait::Gait;
 use super::instant::Instant;
 use super::node::LinearNode;
+use super::phase::{Stance, Swing};
 use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
 use super::switches::{self, TimedNode, force_samples};
 
@@ -218,11 +219,11 @@ impl Layout {
                 swing.switches = None;
                 let before = stances[j].first_force;
                 for (n, node) in stances[j].forces.iter_mut().enumerate() {
-                    node.terms[0].1 *= switches::share(before + n, None, Some(start));
+                    node.terms[0].1 *= switches::activation(before + n, None, Some(start));
                 }
                 let after = stances[j + 1].first_force;
                 for (n, node) in stances[j + 1].forces.iter_mut().enumerate() {
-                    node.terms[0].1 *= switches::share(after + n, Some(end), None);
+                    node.terms[0].1 *= switches::activation(after + n, Some(end), None);
                 }
             }
             self.set_phases(foot);

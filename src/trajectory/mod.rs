@@ -7,13 +7,15 @@ pub mod gait;
 pub mod instant;
 pub mod layout;
 pub mod node;
+pub mod phase;
 pub mod rotation;
 pub mod sampling;
 pub mod space;
 pub mod spline;
 pub mod switches;
 
-pub use gait::{Gait, Stance, Swing};
+pub use gait::Gait;
 pub use instant::Instant;
 pub use layout::Layout;
 pub use node::LinearNode;
+pub use phase::{Stance, Swing};

@@ -17,8 +17,8 @@
 
 use std::ops::Range;
 
-use super::gait::Swing;
 use super::node::LinearNode;
+use super::phase::Swing;
 use super::spline::SwingBasis;
 
 /// No switch moves further than this from its nominal time, s.
@@ -119,7 +119,7 @@ pub fn ramp(s: f64) -> [f64; 3] {
 }
 
 /// σ of a force at sample k in a stance from `touch_down` to `lift_off`, both in samples; none at the ends of the motion.
-pub fn share(k: usize, touch_down: Option<f64>, lift_off: Option<f64>) -> f64 {
+pub fn activation(k: usize, touch_down: Option<f64>, lift_off: Option<f64>) -> f64 {
     let k = k as f64;
     touch_down.map_or(1.0, |b| ramp(k - 1.0 - b)[0]) * lift_off.map_or(1.0, |a| ramp(a - k - 1.0)[0])
 }
@@ -194,7 +194,7 @@ impl TimedNode {
     }
 
     /// σ of a force.
-    pub fn share(&self) -> f64 {
+    pub fn activation(&self) -> f64 {
         if self.is_timed() { self.node.terms[0].1 } else { 1.0 }
     }
 
@@ -289,10 +289,10 @@ mod tests {
     fn a_force_acts_within_its_stance_alone() {
         // It acts from k − 1 to k + 1.
         for (k, expected) in [(5, 0.0), (6, 0.0), (7, 1.0), (11, 1.0), (12, 0.0), (13, 0.0)] {
-            assert_eq!(share(k, Some(5.0), Some(13.0)), expected, "sample {k}");
+            assert_eq!(activation(k, Some(5.0), Some(13.0)), expected, "sample {k}");
         }
-        assert!((share(7, Some(5.5), None) - 0.5).abs() < 1e-15);
-        assert_eq!(share(0, None, None), 1.0);
+        assert!((activation(7, Some(5.5), None) - 0.5).abs() < 1e-15);
+        assert_eq!(activation(0, None, None), 1.0);
     }
 
     fn walk() -> Vec<Swing> {

@@ -3,7 +3,6 @@
 //! A cache file holds one line of JSON (a header) and then the control points as little-endian floats. Its name is the
 //! SHA-256 of the terrain's samples, the specification and [`SOLVER_VERSION`].
 
-use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +12,7 @@ use sha2::{Digest, Sha256};
 use super::{MapProgress, MapReport, WarpMap, build};
 use crate::heightfield::Heightfield;
 use crate::scenario::MapSpec;
-use crate::{Error, Result};
+use crate::{Error, Result, digest, files};
 
 /// To be raised with every change that makes a different map of the same terrain.
 const SOLVER_VERSION: u32 = 5;
@@ -73,11 +72,7 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
     for v in grid.origin.iter().chain(&grid.spacing).chain(field.samples()) {
         hash.update(v.to_le_bytes());
     }
-    hex(&hash.finalize())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
+    digest::hex(hash)
 }
 
 /// The map in a cache file; none if there is no such file or it is not whole.
@@ -86,7 +81,7 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     let end = bytes.iter().position(|b| *b == b'\n')?;
     let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
     let payload = &bytes[end + 1..];
-    if hex(&Sha256::digest(payload)) != header.checksum {
+    if digest::sha256_hex(payload) != header.checksum {
         return None;
     }
     // The grid may be finer than the specification says, where it does not say.
@@ -103,24 +98,13 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     Some((map, header.report))
 }
 
-/// Written aside and then renamed, so that no reader ever sees half a file.
 fn write(path: &Path, map: &WarpMap, report: &MapReport) -> Result<()> {
     let payload: Vec<u8> = map.control_points().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
-    let header = Header { checksum: hex(&Sha256::digest(&payload)), report: report.clone() };
-    let header = serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    let header = Header { checksum: digest::sha256_hex(&payload), report: report.clone() };
+    let mut bytes = serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    bytes.push(b'\n');
+    bytes.extend_from_slice(&payload);
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory).map_err(|e| Error::io(directory, e))?;
-    // Two processes may build the same map at once: each writes its own file.
-    let aside = path.with_extension(format!("{}.part", std::process::id()));
-    let written = std::fs::File::create(&aside).and_then(|mut file| {
-        file.write_all(&header)?;
-        file.write_all(b"\n")?;
-        file.write_all(&payload)?;
-        std::fs::rename(&aside, path)
-    });
-    written.map_err(|e| {
-        // The half-written file is of no use; that it cannot be removed either is no further news.
-        let _ = std::fs::remove_file(&aside);
-        Error::io(&aside, e)
-    })
+    files::write_atomically(path, &bytes)
 }

@@ -26,7 +26,7 @@ mod spline;
 pub use build::{MapProgress, build};
 pub use cache::{build_cached, default_cache_dir};
 pub use report::{Distribution, EnergyHistory, MapReport, RejectedMap};
-pub use spline::{Order, WarpMap};
+pub use spline::{MapGrid, Order, WarpMap};
 
 /// φ and its derivatives at one point of F.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,6 @@
 
 use super::WarpJet;
 use super::basis::axis_weights;
-use crate::plan::MapGrid;
 use crate::scenario::MapSpec;
 use crate::{Error, Result};
 
@@ -17,6 +16,19 @@ pub enum Order {
     Second,
     /// And ∂²J.
     Third,
+}
+
+/// The warp map as stored.
+#[derive(Clone, Debug)]
+pub struct MapGrid {
+    /// (Nx+3, Ny+3, Nz+3)
+    pub shape: [usize; 3],
+    /// (shape, 3) in C order, m.
+    pub control_points: Vec<[f64; 3]>,
+    /// Corner of the box in F, m.
+    pub origin: [f64; 3],
+    /// Knots by axis, m.
+    pub knots: [Vec<f64>; 3],
 }
 
 /// φ: F → A on a box of cells, continued outside (C²) by moving its faces outwards.

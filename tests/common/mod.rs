@@ -5,12 +5,27 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use warpgait::nlp::solve::{Motion, solve};
+use warpgait::heightfield::Heightfield;
 use warpgait::plan::sampled::Provenance;
-use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan, Seconds};
+use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan};
+use warpgait::planner::{Host, Motion, Progress, Seconds, Task, solve};
 use warpgait::robot::{Box3, Robot};
 use warpgait::scenario::{Formulation, Scenario};
-use warpgait::warp;
+use warpgait::trajectory::Gait;
+use warpgait::warp::{self, WarpMap};
+
+/// Never asks to stop, and builds the maps of continuations anew.
+struct Patient<'a>(&'a Scenario);
+
+impl Host for Patient<'_> {
+    fn on_iteration(&mut self, _: &Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    fn build_map(&mut self, ground: &Heightfield) -> warpgait::Result<Option<WarpMap>> {
+        Ok(Some(warp::build(ground, &self.0.map, &mut |_| ControlFlow::Continue(()))?.0))
+    }
+}
 
 /// Solves a scenario given as text, its map made anew, and samples the motion.
 pub fn solved(text: &str) -> (Motion, Plan) {
@@ -20,8 +35,9 @@ pub fn solved(text: &str) -> (Motion, Plan) {
     let field = Arc::new(ground.field.clone());
     let map = (scenario.formulation == Formulation::Warped)
         .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
-    let motion =
-        solve(&scenario, &robot, &field, map.as_ref(), &mut |_| ControlFlow::Continue(())).expect("a motion");
+    let gait = Gait::of(&scenario, &robot).expect("a gait");
+    let task = Task { scenario: &scenario, robot: &robot, gait: &gait, ground: &field, map: map.as_ref() };
+    let motion = solve(&task, &mut Patient(&scenario)).expect("a motion");
     let provenance = Provenance {
         scenario: &scenario,
         text,
@@ -112,6 +128,7 @@ pub fn standing() -> Plan {
                     .to_vec(),
                 torso: Box3 { center: [0.0; 3], half_size: [0.32, 0.14, 0.10] },
             },
+            limits: None,
             solver: MetaSolver {
                 status: "solved".into(),
                 success: true,

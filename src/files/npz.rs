@@ -9,6 +9,7 @@ use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
+use super::temporary_beside;
 use crate::{Error, Result};
 
 /// Writes an archive to a temporary file beside its target; [`NpzWriter::finish`] renames it, so that a killed process
@@ -116,45 +117,6 @@ impl Drop for NpzWriter {
         drop(self.zip.take());
         let _ = std::fs::remove_file(&self.temporary);
     }
-}
-
-/// Writes a whole file by way of a temporary one beside it.
-pub fn write_atomically(target: &Path, content: &[u8]) -> Result<()> {
-    let temporary = temporary_beside(target)?;
-    let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, target));
-    written.map_err(|e| {
-        let _ = std::fs::remove_file(&temporary);
-        Error::io(target, e)
-    })
-}
-
-/// Makes sure that a file can be written at `target`, without touching what is there.
-pub fn ensure_writable(target: &Path) -> Result<()> {
-    let temporary = temporary_beside(target)?;
-    File::create(&temporary)
-        .and_then(|_| std::fs::remove_file(&temporary))
-        .map_err(|e| Error::input(format!("{}: cannot be written: {e}", target.display())))
-}
-
-/// A name in the same folder, so that renaming does not copy; refuses targets that cannot be files.
-fn temporary_beside(target: &Path) -> Result<PathBuf> {
-    let refuse = |why: &str| Err(Error::input(format!("{}: cannot be written: {why}", target.display())));
-    let Some(name) = target.file_name() else { return refuse("this is not the name of a file") };
-    if target.is_dir() {
-        return refuse("this is a folder; name a file in it");
-    }
-    let folder = match target.parent() {
-        Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
-        Some(parent) => parent,
-        None => return refuse("this is not the name of a file"),
-    };
-    if !folder.is_dir() {
-        return refuse(&format!("there is no folder {}; create it first", folder.display()));
-    }
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}.part", std::process::id()));
-    Ok(folder.join(hidden))
 }
 
 /// Reads the members of an archive; every error names the file and the member.

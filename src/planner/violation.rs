@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::problem::Problem;
+use super::problem::GaitProblem;
 use crate::ipopt::NlpProblem;
 
 /// The largest violation within one named block.
@@ -22,8 +22,13 @@ pub struct BlockViolation {
     pub place: [f64; 2],
 }
 
+/// Whether every constraint and bound holds to the tolerance.
+pub fn is_feasible(problem: &mut GaitProblem, x: &[f64], tolerance: f64) -> bool {
+    table(problem, x).iter().all(|block| block.largest <= tolerance)
+}
+
 /// One row for each block, in the order of the problem, and one for the bounds of the variables.
-pub fn table(problem: &mut Problem, x: &[f64]) -> Vec<BlockViolation> {
+pub fn table(problem: &mut GaitProblem, x: &[f64]) -> Vec<BlockViolation> {
     let rows = problem.num_constraints();
     let (mut lower, mut upper, mut g) = (vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]);
     problem.constraint_bounds(&mut lower, &mut upper);

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::problem::Problem;
+use super::problem::GaitProblem;
 use crate::ipopt::NlpProblem;
 
 /// The largest disagreement within one block.
@@ -28,13 +28,13 @@ const SUSPICIOUS: f64 = 1e-7;
 const NOISE: f64 = 1e-6;
 
 /// Compares all first derivatives at x, and the second ones if the problem has them, in the directions of `variables`.
-pub fn check(problem: &mut Problem, x: &[f64], variables: &[usize]) -> Vec<DerivativeError> {
+pub fn check(problem: &mut GaitProblem, x: &[f64], variables: &[usize]) -> Vec<DerivativeError> {
     check_with(problem, x, variables, |_| {}, |_| {})
 }
 
 /// The same, with the values of the Jacobian and of the Hessian changed before they are looked at: to see that the check sees.
 pub fn check_with(
-    problem: &mut Problem,
+    problem: &mut GaitProblem,
     x: &[f64],
     variables: &[usize],
     tamper: impl FnOnce(&mut [f64]),
@@ -106,7 +106,7 @@ pub fn check_with(
 /// difference is off by J/2 (1 − d/step), and a smaller step only makes that rarer. The difference to the other side sees no knot. So
 /// where the central one disagrees, those to both sides are asked as well, and the nearest counts; a wrong derivative disagrees with all.
 fn check_hessian(
-    problem: &mut Problem,
+    problem: &mut GaitProblem,
     x: &[f64],
     variables: &[usize],
     tamper: impl FnOnce(&mut [f64]),
@@ -127,7 +127,7 @@ fn check_hessian(
         (r.to_vec(), c.to_vec())
     };
     let mut jacobian = vec![f64::NAN; jacobian_rows.len()];
-    let mut lagrangian = |problem: &mut Problem, x: &[f64]| -> Vec<f64> {
+    let mut lagrangian = |problem: &mut GaitProblem, x: &[f64]| -> Vec<f64> {
         let mut gradient = vec![f64::NAN; n];
         problem.gradient(x, true, &mut gradient);
         gradient.iter_mut().for_each(|g| *g *= factor);

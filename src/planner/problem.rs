@@ -1,6 +1,5 @@
 //! The one place where the problem is composed: variables with bounds, constraint blocks, costs, and their sparse derivatives.
 
-use crate::constraints::Constraint;
 use crate::constraints::base_clearance::BaseClearance;
 use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
@@ -16,7 +15,6 @@ use crate::constraints::normal_force::NormalForce;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
 use crate::constraints::swing::SwingClearance;
-use crate::costs::Cost;
 use crate::costs::base_acceleration::BaseAcceleration;
 use crate::costs::force_rate::ForceRate;
 use crate::costs::posture::Posture;
@@ -25,14 +23,11 @@ use crate::ipopt::NlpProblem;
 use crate::scenario::{Cone, Law, Scenario};
 use crate::trajectory::spline::SWING_CONTROL_POINTS;
 
-use super::curvature::Curvature;
-use super::model::Model;
-use super::share::Share;
-use super::sink::{Pattern, Sink};
-use super::state::State;
+use super::threads::ThreadSplit;
+use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::sink::{Gradient, Pattern, Sink};
+use crate::nlp::{Constraint, Cost, Model, State};
 
-/// Asked for beyond `base_clearance`, m, so that it holds between the points and samples that are looked at.
-const CLEARANCE_MARGIN: f64 = 0.01;
 /// The objective is this times the scenario's costs: Ipopt's tests of optimality are absolute, and with an objective of the
 /// order of one it takes a third of the iterations (rippled, medium: 25 instead of 65).
 const COST_SCALE: f64 = 1e3;
@@ -42,7 +37,7 @@ const SWING_WEIGHT: f64 = 1e-3;
 const POSTURE_WEIGHT: f64 = 100.0;
 
 /// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper.
-pub struct Problem {
+pub struct GaitProblem {
     /// What stays the same.
     pub model: Model,
     /// The nodes at the last x.
@@ -51,10 +46,8 @@ pub struct Problem {
     offsets: Vec<usize>,
     costs: Vec<Box<dyn Cost>>,
     jacobian: Pattern,
-    jacobian_share: Share,
-    gradient: Pattern,
-    hessian: Option<Hessian>,
-    gradient_values: Vec<f64>,
+    jacobian_split: ThreadSplit,
+    hessian: Option<LagrangianHessian>,
     /// The last x, and whether the second derivatives of the nodes are there.
     evaluated: Vec<f64>,
     curved: bool,
@@ -72,7 +65,7 @@ pub struct Choice {
     pub exact_hessian: bool,
 }
 
-impl Problem {
+impl GaitProblem {
     /// Composes the problem of a scenario, to be started from `initial`.
     pub fn new(scenario: &Scenario, model: Model, initial: Vec<f64>, choice: Choice) -> Self {
         let (motion, contact) = (&scenario.motion, &scenario.contact);
@@ -92,7 +85,7 @@ impl Problem {
             Box::new(NormalForce::new(&model, motion.force_limit, motion.pull_limit)),
             Box::new(OnGround::new(&model)),
             Box::new(SwingClearance::new(&model, motion.swing_clearance)),
-            Box::new(BaseClearance::new(&model, motion.base_clearance + CLEARANCE_MARGIN)),
+            Box::new(BaseClearance::new(&model, motion.base_clearance)),
             Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
         ];
         if let Some(max_slope) = contact.max_slope {
@@ -136,13 +129,8 @@ impl Problem {
         let jacobian = Pattern::record_parts(blocks.len(), |part, sink| {
             blocks[part].jacobian(&model, &state, offsets[part], sink);
         });
-        let gradient = Pattern::record(|sink| {
-            for cost in &costs {
-                cost.gradient(&model, &state, &initial, sink);
-            }
-        });
         let hessian = exact_hessian.then(|| {
-            Hessian::new(&Terms {
+            LagrangianHessian::new(&Terms {
                 model: &model,
                 state: &state,
                 blocks: &blocks,
@@ -155,17 +143,15 @@ impl Problem {
         });
         let (lower, upper) = variable_bounds(&model, &initial);
         Self {
-            gradient_values: vec![0.0; gradient.len()],
             evaluated: initial.clone(),
             curved: exact_hessian,
-            jacobian_share: Share::new(&jacobian, 0..blocks.len(), model.threads),
+            jacobian_split: ThreadSplit::new(&jacobian, 0..blocks.len(), model.threads),
             model,
             state,
             blocks,
             offsets,
             costs,
             jacobian,
-            gradient,
             hessian,
             initial,
             lower,
@@ -176,6 +162,16 @@ impl Problem {
     /// The constraint blocks with the number of their first row.
     pub fn blocks(&self) -> impl Iterator<Item = (&dyn Constraint, usize)> {
         self.blocks.iter().map(|b| &**b as &dyn Constraint).zip(self.offsets.iter().copied())
+    }
+
+    /// The numbers of variables, constraints and entries of the Jacobian and the Hessian.
+    pub fn size(&self) -> [usize; 4] {
+        [
+            self.num_variables(),
+            self.num_constraints(),
+            self.jacobian.len(),
+            self.hessian.as_ref().map_or(0, |h| h.pattern.len()),
+        ]
     }
 
     /// The costs.
@@ -266,7 +262,7 @@ struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    fn hessian(&self, term: usize, curvature: &mut Curvature, sink: &mut Sink) {
+    fn hessian(&self, term: usize, curvature: &mut NodeCurvature, sink: &mut Sink) {
         let Self { model, state, .. } = self;
         match self.blocks.get(term) {
             Some(block) => {
@@ -281,28 +277,28 @@ impl Terms<'_> {
     }
 }
 
-/// The Hessian of the Lagrangian and how it is shared: first all terms, each thread with a sum of its own of the nodes' weights,
+/// The LagrangianHessian of the Lagrangian and how it is shared: first all terms, each thread with a sum of its own of the nodes' weights,
 /// then, as further parts of the pattern, the nodes.
-struct Hessian {
+struct LagrangianHessian {
     pattern: Pattern,
-    terms: Share,
-    nodes: Share,
-    curvatures: [Curvature; 2],
+    terms: ThreadSplit,
+    nodes: ThreadSplit,
+    curvatures: [NodeCurvature; 2],
 }
 
-impl Hessian {
+impl LagrangianHessian {
     fn new(all: &Terms) -> Self {
-        let mut curvature = Curvature::new(all.state);
+        let mut curvature = NodeCurvature::new(all.state);
         let terms = all.blocks.len() + all.costs.len();
-        let parts = terms + Curvature::PARTS;
+        let parts = terms + NodeCurvature::PARTS;
         let pattern = Pattern::record_parts(parts, |part, sink| match part.checked_sub(terms) {
             None => all.hessian(part, &mut curvature, sink),
-            Some(node) => curvature.say(node, all.model, all.state, sink),
+            Some(node) => curvature.scatter(node, all.model, all.state, sink),
         });
         let threads = all.model.threads;
         Self {
-            terms: Share::new(&pattern, 0..terms, threads),
-            nodes: Share::new(&pattern, terms..parts, threads),
+            terms: ThreadSplit::new(&pattern, 0..terms, threads),
+            nodes: ThreadSplit::new(&pattern, terms..parts, threads),
             pattern,
             curvatures: [curvature.clone(), curvature],
         }
@@ -325,12 +321,12 @@ impl Hessian {
             here.merge(there);
         }
         let first = all.blocks.len() + all.costs.len();
-        let say = |part: usize, sink: &mut Sink| here.say(part - first, all.model, all.state, sink);
-        nodes.add(pattern, out, say, say);
+        let scatter = |part: usize, sink: &mut Sink| here.scatter(part - first, all.model, all.state, sink);
+        nodes.add(pattern, out, scatter, scatter);
     }
 }
 
-impl NlpProblem for Problem {
+impl NlpProblem for GaitProblem {
     fn num_variables(&self) -> usize {
         self.model.layout.variables
     }
@@ -362,15 +358,9 @@ impl NlpProblem for Problem {
 
     fn gradient(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
         self.update(x, false);
-        let (model, state, costs) = (&self.model, &self.state, &self.costs);
-        self.gradient.fill(&mut self.gradient_values, |sink| {
-            for cost in costs {
-                cost.gradient(model, state, x, sink);
-            }
-        });
         out.fill(0.0);
-        for (&column, &value) in self.gradient.columns.iter().zip(&self.gradient_values) {
-            out[column as usize] = value;
+        for cost in &self.costs {
+            cost.gradient(&self.model, &self.state, x, &mut Gradient(out));
         }
     }
 
@@ -388,9 +378,9 @@ impl NlpProblem for Problem {
     fn jacobian_values(&mut self, x: &[f64], _new_x: bool, out: &mut [f64]) {
         self.update(x, false);
         let (model, state, blocks, offsets) = (&self.model, &self.state, &self.blocks, &self.offsets);
-        let say = |part: usize, sink: &mut Sink| blocks[part].jacobian(model, state, offsets[part], sink);
+        let scatter = |part: usize, sink: &mut Sink| blocks[part].jacobian(model, state, offsets[part], sink);
         out.fill(0.0);
-        self.jacobian_share.add(&self.jacobian, out, say, say);
+        self.jacobian_split.add(&self.jacobian, out, scatter, scatter);
     }
 
     fn hessian_structure(&self) -> Option<(&[i32], &[i32])> {

@@ -1,0 +1,21 @@
+//! By how much limits are tightened in the nonlinear program, so that they hold between its samples and on the full robot, and
+//! where each figure comes from.
+//!
+//! Between two samples, a path with acceleration a leaves the straight line through them by up to a Δt²/8.
+
+/// Off the reach box (Eq. 4) on each side for a standing foot, m: 0.5 mm for the body at 1.5 m/s².
+pub const REACH_STANDING: f64 = 0.001;
+/// Off the reach box at lift-off and touch-down, m; where these are variables, at their earliest and latest.
+pub const REACH_SWITCHING: f64 = 0.009;
+/// Off the reach box in swing, or where a foot may swing, m: a foot at 50 m/s².
+pub const REACH_SWINGING: f64 = 0.015;
+/// On top of `motion.base_clearance`, m: only some points of the underside have rows, and only at some samples.
+pub const BASE_CLEARANCE: f64 = 0.01;
+/// Between knee or shank and the ground, m: for what happens between the samples, and the ground's curvature across the shank.
+pub const KNEE_CLEARANCE: f64 = 0.02;
+/// Fraction of a joint's speed limit that a plan uses. The rest is for what happens between samples and for what the plan
+/// does not know: the legs' own mass moves the trunk relative to the centre of mass.
+pub const JOINT_SPEED: f64 = 0.72;
+/// Fraction of a joint's torque limit that a plan uses. The rest is for what the plan does not know: the weight of the legs,
+/// and the controller's corrections.
+pub const JOINT_TORQUE: f64 = 0.8;

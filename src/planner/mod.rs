@@ -1,0 +1,31 @@
+//! The nonlinear program of a scenario, composed and solved.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
+//! | [`guess`] | where a solve starts |
+//! | [`solve`] | the sequence of stages, and one stage |
+//! | [`stage`] | which stages there are |
+//! | `stopping` | when a stage has done what its effort demands |
+//! | `options` | the options given to Ipopt |
+//! | [`motion`] | what a solve returns |
+//! | [`violation`] | which constraint is violated most, where and when |
+//! | [`derivatives`] | analytic derivatives against differences |
+//! | `threads` | the evaluation, split between two threads |
+
+pub mod derivatives;
+pub mod guess;
+pub mod motion;
+mod options;
+pub mod problem;
+pub mod solve;
+pub mod stage;
+mod standing;
+mod stopping;
+mod threads;
+pub mod violation;
+
+pub use motion::{Motion, Seconds};
+pub use problem::GaitProblem;
+pub use solve::{Host, Progress, Task, solve};
+pub use stage::Stage;

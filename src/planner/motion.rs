@@ -1,0 +1,51 @@
+//! What a solve returns.
+
+use serde::{Deserialize, Serialize};
+
+use super::violation::BlockViolation;
+use crate::ipopt::IterationRecord;
+use crate::nlp::Model;
+
+/// Where the wall time of a solve went, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seconds {
+    /// Building the map.
+    pub map: f64,
+    /// Building the guess.
+    pub guess: f64,
+    /// Evaluating the NLP.
+    pub evaluation: f64,
+    /// Everything else in Ipopt.
+    pub linear_solver: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+/// A motion, solved or not.
+pub struct Motion {
+    /// What it is a motion of.
+    pub model: Model,
+    /// The variables.
+    pub x: Vec<f64>,
+    /// How the solve ended, in words.
+    pub status: String,
+    /// Every constraint holds to the tolerance.
+    pub solved: bool,
+    /// By Ctrl-C, or by the host.
+    pub interrupted: bool,
+    /// Iterations of all stages.
+    pub iterations: usize,
+    /// Largest violation by block.
+    pub violations: Vec<BlockViolation>,
+    /// Every iteration of every stage; seconds count from the start of the solve.
+    pub history: Vec<IterationRecord>,
+    /// Where the time went; the map's is not included.
+    pub seconds: Seconds,
+}
+
+impl Motion {
+    /// The largest violation of all blocks.
+    pub fn max_violation(&self) -> f64 {
+        self.violations.iter().map(|v| v.largest).fold(0.0, f64::max)
+    }
+}

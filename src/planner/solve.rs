@@ -1,0 +1,322 @@
+//! From a scenario to a motion: guess, NLP, Ipopt, and what to try when the plain solve fails.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::guess;
+use super::motion::{Motion, Seconds};
+use super::options;
+use super::problem::{Choice, GaitProblem};
+use super::stage::Stage;
+use super::stopping::StoppingRule;
+use super::violation;
+use crate::heightfield::Heightfield;
+use crate::ipopt::{self, IterationRecord, Status};
+use crate::nlp::Model;
+use crate::robot::Robot;
+use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
+use crate::trajectory::Gait;
+use crate::trajectory::space::Space;
+use crate::warp::WarpMap;
+use crate::{Error, Result};
+
+/// Steps of a continuation with `solver.continuation = "auto"`.
+const CONTINUATION_STEPS: u32 = 3;
+/// Fraction of the iterations that the plain solve may take when a continuation may follow.
+const PLAIN_FRACTION: f64 = 0.5;
+
+/// What is to be planned.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Its robot.
+    pub robot: &'a Robot,
+    /// Its gait.
+    pub gait: &'a Gait,
+    /// Its ground.
+    pub ground: &'a Arc<Heightfield>,
+    /// The map over that ground, for the warped formulation.
+    pub map: Option<&'a WarpMap>,
+}
+
+impl Task<'_> {
+    /// The model over the whole terrain.
+    fn model(&self) -> Result<Model> {
+        let space = match (self.scenario.formulation, self.map) {
+            (Formulation::Direct, _) => Space::Direct,
+            (Formulation::Warped, Some(map)) => Space::Warped(Box::new(map.clone())),
+            (Formulation::Warped, None) => {
+                return Err(Error::Internal("the warped formulation needs a map".into()));
+            }
+        };
+        Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), space)
+    }
+
+    /// The NLP at its guess, for checks of its derivatives and for timing.
+    ///
+    /// # Errors
+    /// Those of the guess.
+    pub fn problem(&self) -> Result<GaitProblem> {
+        let model = self.model()?;
+        let x = guess::guess(self.scenario, &model)?;
+        Ok(GaitProblem::new(self.scenario, model, x, Choice { with_costs: true, exact_hessian: true }))
+    }
+}
+
+/// An iteration, for people who wait.
+#[derive(Clone, Debug)]
+pub struct Progress<'a> {
+    /// What is being solved.
+    pub stage: Stage,
+    /// The iteration, counted over all stages.
+    pub iteration: usize,
+    /// The iteration as Ipopt reports it.
+    pub record: &'a IterationRecord,
+}
+
+/// What a solve needs from its caller while it runs.
+pub trait Host {
+    /// Called at every iteration; may ask to stop.
+    fn on_iteration(&mut self, progress: &Progress) -> ControlFlow<()>;
+
+    /// Builds the map over the ground of a continuation; none when the user asked to stop.
+    ///
+    /// # Errors
+    /// Those of building a map.
+    fn build_map(&mut self, ground: &Heightfield) -> Result<Option<WarpMap>>;
+}
+
+/// Plans a motion: the plain solve first; if it finds no feasible point and the scenario allows it, a continuation, in which
+/// the terrain grows out of the plane in steps, each solved from the one before.
+///
+/// # Errors
+/// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
+pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
+    let solver = &task.scenario.solver;
+    let steps = match solver.continuation {
+        Continuation::Mode(ContinuationMode::Off) => 0,
+        Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
+        Continuation::Steps(n) => n,
+    };
+    let fraction = if steps == 0 { 1.0 } else { PLAIN_FRACTION };
+    let budget = (solver.max_iterations as f64 * fraction) as usize;
+    let mut solve = Solve::new(task, host);
+    let mut end = solve.plain(budget)?;
+    if !end.feasible && !end.interrupted && steps > 0 {
+        end = solve.continuation(steps, end)?;
+    }
+    Ok(solve.finish(end))
+}
+
+/// Where a stage starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// At the guess.
+    Guess,
+    /// At a point that obeys all constraints, or did before some were added or the terrain grew.
+    Feasible,
+}
+
+/// How a stage ended.
+struct StageEnd {
+    problem: GaitProblem,
+    x: Vec<f64>,
+    feasible: bool,
+    interrupted: bool,
+    status: String,
+}
+
+/// What all stages of a solve have in common.
+struct Solve<'a> {
+    task: &'a Task<'a>,
+    host: &'a mut dyn Host,
+    start: Instant,
+    history: Vec<IterationRecord>,
+    iterations: usize,
+    seconds: Seconds,
+}
+
+impl<'a> Solve<'a> {
+    fn new(task: &'a Task, host: &'a mut dyn Host) -> Self {
+        Self {
+            task,
+            host,
+            start: Instant::now(),
+            history: Vec::new(),
+            iterations: 0,
+            seconds: Seconds::default(),
+        }
+    }
+
+    fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
+        let start = Instant::now();
+        let x = guess::guess(self.task.scenario, model)?;
+        self.seconds.guess += start.elapsed().as_secs_f64();
+        Ok(x)
+    }
+
+    /// Solves from the guess with at most `budget` iterations.
+    ///
+    /// Where legs are known, first to a feasible point without their joints, whose speeds and torques at the guess may be anything:
+    /// out of the pit this takes a third of the iterations that all at once take, and converges where that does not
+    /// (docs/results.md).
+    fn plain(&mut self, budget: usize) -> Result<StageEnd> {
+        let model = self.task.model()?;
+        let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
+        if model.legs.iter().any(Option::is_some) {
+            let mut rough = model.clone();
+            rough.legs.fill(None);
+            let rough = self.stage(Stage::WithoutJoints, rough, x, start, Effort::Feasible, budget)?;
+            if !rough.feasible || rough.interrupted {
+                return Ok(rough);
+            }
+            (x, start) = (rough.x, Start::Feasible);
+        }
+        let left = budget.saturating_sub(self.iterations);
+        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
+    }
+
+    /// The terrain at 1/n, 2/n, … of its height, each solved to a feasible point from the last, the whole one with the costs.
+    fn continuation(&mut self, steps: u32, failed: StageEnd) -> Result<StageEnd> {
+        let scenario = self.task.scenario;
+        let mut last = failed;
+        let mut from: Option<Vec<f64>> = None;
+        for step in 1..=steps {
+            let left = scenario.solver.max_iterations.saturating_sub(self.iterations);
+            if left == 0 || last.interrupted {
+                break;
+            }
+            let stage = Stage::Continuation { step, steps };
+            let Some(model) = self.scaled_model(stage)? else {
+                last.interrupted = true;
+                break;
+            };
+            let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
+            if let Some(from) = &from {
+                // The pinned start is where this terrain has it; all else continues from the last step.
+                x[6..].copy_from_slice(&from[6..]);
+                start = Start::Feasible;
+            }
+            let effort = if stage.is_whole() { scenario.solver.effort } else { Effort::Feasible };
+            last = self.stage(stage, model, x, start, effort, left)?;
+            if !last.feasible && !stage.is_whole() {
+                let percent = 100.0 * stage.height_fraction();
+                last.status = format!("{} with the terrain at {percent:.0} % of its height", last.status);
+            }
+            from = Some(last.x.clone());
+        }
+        Ok(last)
+    }
+
+    /// The model of a stage of a continuation; none when the user asked to stop while its map was built.
+    fn scaled_model(&mut self, stage: Stage) -> Result<Option<Model>> {
+        if stage.is_whole() {
+            return self.task.model().map(Some);
+        }
+        let Task { scenario, robot, gait, ground, .. } = *self.task;
+        let ground = Arc::new(scaled(ground, stage.height_fraction())?);
+        let space = match scenario.formulation {
+            Formulation::Direct => Space::Direct,
+            Formulation::Warped => match self.host.build_map(&ground)? {
+                Some(map) => Space::Warped(Box::new(map)),
+                None => return Ok(None),
+            },
+        };
+        Model::new(scenario, robot, gait, ground, space).map(Some)
+    }
+
+    /// Solves from x with at most `budget` iterations.
+    fn stage(
+        &mut self,
+        stage: Stage,
+        model: Model,
+        x: Vec<f64>,
+        start: Start,
+        effort: Effort,
+        budget: usize,
+    ) -> Result<StageEnd> {
+        let scenario = self.task.scenario;
+        let tolerance = scenario.solver.tolerance;
+        let with_costs = effort != Effort::Feasible && scenario.motion.smoothness != [0.0, 0.0];
+        let hessian = scenario.solver.hessian.unwrap_or(if with_costs {
+            Hessian::Exact
+        } else {
+            Hessian::LimitedMemory
+        });
+        let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
+        let mut problem = GaitProblem::new(scenario, model, x, choice);
+        let centered =
+            (start, hessian, scenario.formulation) == (Start::Guess, Hessian::Exact, Formulation::Warped);
+        let options = options::of(&scenario.solver, hessian, centered, budget);
+
+        let mut rule = StoppingRule::new(effort, with_costs, tolerance);
+        let mut stopped = false;
+        let (history, host) = (&mut self.history, &mut *self.host);
+        let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
+        let solution = ipopt::solve(&mut problem, &options, None, &mut |record, x| {
+            let iteration = record.iteration + before;
+            // A later stage starts at the point where the one before it ended, which has its row.
+            if record.iteration > 0 || history.is_empty() {
+                let seconds = record.seconds + seconds_before;
+                history.push(IterationRecord { iteration, seconds, ..record.clone() });
+                if host.on_iteration(&Progress { stage, iteration, record }).is_break() {
+                    stopped = true;
+                    return ControlFlow::Break(());
+                }
+            }
+            rule.observe(record, x)
+        })
+        .map_err(|error| Error::Internal(error.to_string()))?;
+        self.iterations += solution.history.last().map_or(0, |r| r.iteration);
+        self.seconds.evaluation += solution.evaluation_seconds;
+        self.seconds.linear_solver += solution.total_seconds - solution.evaluation_seconds;
+
+        let interrupted = stopped || solution.status == Status::Interrupted;
+        let satisfied = rule.is_satisfied();
+        let last_feasible = violation::is_feasible(&mut problem, &solution.x, tolerance);
+        let x = rule.best(solution.x, solution.objective, last_feasible);
+        let feasible = violation::is_feasible(&mut problem, &x, tolerance);
+        let status = status(solution.status, feasible, satisfied, with_costs);
+        Ok(StageEnd { problem, x, feasible, interrupted, status })
+    }
+
+    fn finish(mut self, mut end: StageEnd) -> Motion {
+        let violations = violation::table(&mut end.problem, &end.x);
+        self.seconds.total = self.start.elapsed().as_secs_f64();
+        // Plans are sampled from the motion as it is, at the switches that were found.
+        end.problem.model.layout.freeze(&end.x);
+        Motion {
+            solved: end.feasible && !end.interrupted,
+            interrupted: end.interrupted,
+            status: end.status,
+            model: end.problem.model,
+            x: end.x,
+            iterations: self.iterations,
+            violations,
+            history: self.history,
+            seconds: self.seconds,
+        }
+    }
+}
+
+/// How a stage ended, in words.
+fn status(status: Status, feasible: bool, satisfied: bool, with_costs: bool) -> String {
+    match status {
+        Status::StoppedByCallback if satisfied && with_costs => {
+            "feasible, and the cost no longer decreases".to_string()
+        }
+        Status::StoppedByCallback if satisfied => "feasible".to_string(),
+        Status::StoppedByCallback => Status::Interrupted.to_string(),
+        status if feasible => format!("feasible ({status})"),
+        status => status.to_string(),
+    }
+}
+
+/// The ground with all heights times `fraction`.
+fn scaled(ground: &Heightfield, fraction: f64) -> Result<Heightfield> {
+    let heights: Vec<f64> = ground.samples().iter().map(|h| h * fraction).collect();
+    let grid = ground.grid();
+    Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &heights)
+}
