@@ -1,6 +1,8 @@
 //! Feet and forces: on the ground in stance, over it in swing, forces within their cones and limits.
 
-use super::{Finding, Residuals, Subject, Worst, dot, laws, norm, scale, sub};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst};
+use super::vector::{dot, norm, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     feet(s, findings, residuals);

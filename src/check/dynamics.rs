@@ -5,9 +5,9 @@
 //! p(t−h) − 2p(t) + p(t+h) = h² ∫ hat(s) p̈(t+s) ds, so that the law holds for it with the forces averaged by the same
 //! hat; Simpson's rule (1, 4, 1)/6 does this to fourth order. The larger residual counts.
 
-use super::{
-    Finding, Residuals, Subject, Worst, add, cross, dot, laws, norm, rms, rotate, rotate_back, scale, sub,
-};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst, rms};
+use super::vector::{add, cross, dot, norm, rotate, rotate_back, scale, sub};
 
 /// Length that makes a torque comparable with a weight, m.
 const LEVER: f64 = 0.3;
@@ -24,7 +24,12 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     quaternions(s, findings);
 }
 
-fn report(findings: &mut Vec<Finding>, mean: &'static laws::Law, most: &'static laws::Law, values: &[f64]) {
+fn report(
+    findings: &mut Vec<Finding>,
+    mean: &'static laws::CheckedLaw,
+    most: &'static laws::CheckedLaw,
+    values: &[f64],
+) {
     let mut worst = Worst::default();
     for (n, value) in values.iter().enumerate() {
         worst.meet(*value, n, None);

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 
 /// One law.
 #[derive(Debug, PartialEq)]
-pub struct Law {
+pub struct CheckedLaw {
     /// As in `checks` of a plan and in a file of limits.
     pub name: &'static str,
     /// Unit of its value.
@@ -23,10 +23,10 @@ pub struct Law {
 
 macro_rules! laws {
     ($($constant:ident = $name:literal, $unit:literal, $limit:expr, $strict:expr, $meaning:literal;)*) => {
-        $(pub(super) const $constant: &Law =
-            &Law { name: $name, unit: $unit, limit: $limit, strict: $strict, meaning: $meaning };)*
+        $(pub(super) const $constant: &CheckedLaw =
+            &CheckedLaw { name: $name, unit: $unit, limit: $limit, strict: $strict, meaning: $meaning };)*
         /// All laws, in the order of the report.
-        pub const LAWS: &[&Law] = &[$($constant),*];
+        pub const LAWS: &[&CheckedLaw] = &[$($constant),*];
     };
 }
 
@@ -73,12 +73,12 @@ laws! {
 
 /// The limits in force.
 #[derive(Clone, Debug, Default)]
-pub struct Limits {
+pub struct CheckLimits {
     strict: bool,
     changed: BTreeMap<String, f64>,
 }
 
-impl Limits {
+impl CheckLimits {
     /// The default limits; with `strict`, how the base moves counts too.
     pub fn new(strict: bool) -> Self {
         Self { strict, changed: BTreeMap::new() }
@@ -112,7 +112,7 @@ impl Limits {
     }
 
     /// The limit of a law, if it has one.
-    pub fn of(&self, law: &Law) -> Option<f64> {
+    pub fn of(&self, law: &CheckedLaw) -> Option<f64> {
         let strict = if self.strict { law.strict } else { None };
         self.changed.get(law.name).copied().or(strict).or(law.limit)
     }

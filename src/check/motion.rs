@@ -1,6 +1,8 @@
 //! The body: reach, clearance, start and goal, and whether anything jumps.
 
-use super::{Finding, Residuals, Subject, Worst, add, laws, norm, rms, rotate, rotate_back, scale, sub};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst, rms};
+use super::vector::{add, norm, rotate, rotate_back, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     reach(s, findings, residuals);

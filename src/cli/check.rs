@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Ending;
 use super::console::Console;
-use crate::check::{CheckReport, Limits, check_with};
+use crate::check::{CheckLimits, CheckReport, check_with};
 use crate::files::{ensure_writable, write_atomically};
 use crate::plan::Plan;
 use crate::{Result, report};
@@ -31,7 +31,7 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
     if let Some(plot) = &arguments.plot {
         ensure_writable(plot)?;
     }
-    let mut limits = Limits::new(arguments.strict);
+    let mut limits = CheckLimits::new(arguments.strict);
     if let Some(file) = &arguments.limits {
         limits = limits.read(file)?;
     }
