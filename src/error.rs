@@ -3,7 +3,7 @@
 /// Everything that can go wrong before or after a solve. A solve that does not converge is not an error but a result.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The user's input is wrong: says what, where, and what to do. Exit code 2.
+    /// The user's input is wrong; the message says what is wrong, where, and what to do. Exit code 2.
     #[error("{0}")]
     Input(String),
     /// A file could not be read or written. Exit code 2.
@@ -11,10 +11,10 @@ pub enum Error {
     Io {
         /// The file.
         path: String,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// Something inside failed that no input should cause.
+    /// A failure that no input should cause.
     #[error("internal error: {0}")]
     Internal(String),
 }

@@ -1,4 +1,4 @@
-//! The laws of motion, and whether the plan's derivatives are derivatives.
+//! The laws of motion (Eq. 2), and whether the plan's velocities and accelerations are derivatives of its positions.
 //!
 //! Each law is evaluated twice: at every sample with the plan's own accelerations, and from positions and orientations
 //! alone. A second difference equals the acceleration averaged with a hat of half width h,
@@ -9,7 +9,7 @@ use super::laws;
 use super::subject::{Finding, Residuals, Subject, Worst, rms};
 use super::vector::{add, cross, dot, norm, rotate, rotate_back, scale, sub};
 
-/// Length that makes a torque comparable with a weight, m.
+/// Lever arm by which torques are compared with the weight, m.
 const LEVER: f64 = 0.3;
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
@@ -75,7 +75,7 @@ fn newton(s: &Subject, forces: &[[f64; 3]]) -> Vec<f64> {
 /// ‖L̇ − Σ(pᵢ − p) × fᵢ‖ by sample, % of m g · 0.3 m, with L = R I Rᵀ ω.
 fn euler(s: &Subject, torques: &[[f64; 3]]) -> Vec<f64> {
     let plan = s.plan;
-    // From orientations alone: the mean angular velocity between two samples, and the inertia half way.
+    // From orientations alone: the mean angular velocity between two samples, and the inertia halfway.
     let momenta: Vec<[f64; 3]> = plan
         .base_quaternion_wxyz
         .windows(2)
@@ -141,7 +141,7 @@ fn consistency(s: &Subject, findings: &mut Vec<Finding>) {
         .map(|n| {
             let acceleration =
                 sub(difference(&plan.base_linear_velocity, n), hat(&plan.base_linear_acceleration, n));
-            // A velocity error that lasts a tenth of a second is one of acceleration, so that one figure serves.
+            // A velocity error over a tenth of a second counts as an error of acceleration, so that one figure covers both.
             let velocity = sub(difference(&plan.base_position, n), hat(&plan.base_linear_velocity, n));
             100.0 * norm(acceleration).max(norm(velocity) / 0.1) / gravity
         })

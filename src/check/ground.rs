@@ -39,7 +39,7 @@ impl PlanGround {
         [self.origin[0], end(0, self.columns), self.origin[1], end(1, self.rows)]
     }
 
-    /// Whether the grid reaches to this place.
+    /// Whether a place lies on the grid.
     pub fn covers(&self, x: f64, y: f64) -> bool {
         let [x_min, x_max, y_min, y_max] = self.extent();
         let slack = 1e-9;
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn ripples_are_met_to_a_hundredth_of_a_millimetre() {
+    fn ripples_are_met_to_a_hundredth_of_a_millimeter() {
         let h = |x: f64, y: f64| 0.25 * (2.618 * x).sin() * (2.618 * y).sin();
         let ground = PlanGround::new(&sampled(51, 0.04, h));
         let worst = (0..2000)

@@ -1,7 +1,7 @@
 //! The check: every law recomputed in ambient space from the plan alone, on the plan's own samples.
 //!
-//! Nothing of the solver is used: positions, forces and heights are read from the plan, derivatives are taken by
-//! differences, normals from a spline through the plan's own height grid. Every row is "value ≤ limit".
+//! No code of the planner is used: positions, forces and heights are read from the plan, derivatives are differences, and normals
+//! come from a spline through the plan's own height grid. Every row is "value ≤ limit".
 
 mod contact;
 mod dynamics;
@@ -23,7 +23,7 @@ use subject::Subject;
 pub struct CheckReport {
     /// The laws, each with its worst value and verdict.
     pub rows: Vec<CheckRow>,
-    /// What is measured without a limit; the limits are infinite.
+    /// Figures without a limit; their limits are infinite.
     pub figures: Vec<CheckRow>,
     /// Whether every row holds.
     pub passed: bool,
@@ -31,8 +31,11 @@ pub struct CheckReport {
     pub residuals: Residuals,
 }
 
-/// Checks a plan against the default limits. Fails when a value is not finite or an array has the wrong length, and when the scenario in the plan cannot be read, since limits such as
-/// the swing clearance come from it.
+/// Checks a plan against the default limits.
+///
+/// # Errors
+/// When a value is not finite, an array has the wrong length, or the scenario in the plan cannot be read (limits such as the swing
+/// clearance come from it).
 pub fn check(plan: &Plan) -> Result<CheckReport> {
     check_with(plan, &CheckLimits::default())
 }

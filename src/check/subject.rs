@@ -29,14 +29,14 @@ pub struct Residuals {
 /// A law with its worst value.
 pub(super) type Finding = (&'static CheckedLaw, Worst);
 
-/// The plan with what the checks share.
+/// The plan with what all checks use.
 pub(super) struct Subject<'a> {
     pub plan: &'a Plan,
     pub scenario: &'a Scenario,
     pub ground: PlanGround,
     pub samples: usize,
     pub feet: usize,
-    /// s between samples.
+    /// Time between samples, s.
     pub step: f64,
     /// m g, N.
     pub weight: f64,
@@ -87,7 +87,7 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// The largest value met, and where.
+/// The largest value seen, and where.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Worst {
     pub value: f64,

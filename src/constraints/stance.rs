@@ -4,10 +4,10 @@
 //!   zᵀp_i − h(p_i) = 0
 //! ```
 //!
-//! In F the ground is z̄ = 0 up to the misfit of the map's bottom face; asking for it in ambient space makes the gap exactly
-//! zero there, and z̄ is then minus that misfit. A foothold is a variable of its own stance and cannot slip.
+//! In F the ground is z̄ = 0 up to the misfit of the map's bottom face; imposing it in ambient space makes the gap exactly
+//! zero there, and z̄ is then minus that misfit. Each stance has one foothold, so a foot cannot slip.
 //!
-//! Rows: one a stance, m.
+//! Rows: one for each stance, m.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::ground_normal::height_form;

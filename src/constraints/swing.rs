@@ -5,9 +5,9 @@
 //! ```
 //!
 //! The left side is the distance to the tangent plane of the ground below the foot. In the middle of a swing the clearance
-//! is the scenario's `swing_clearance`; at the samples before and after it a share of it that falls off towards both ends
-//! like the parabola 4u(1−u), so that feet leave and land steeply enough to pass stones. In the space of the variables the
-//! free control points are bounded as well where that is sound (see `planner::problem`).
+//! is the scenario's `swing_clearance`. At the samples before and after it, a fraction of it is required that falls off toward
+//! both ends like the parabola 4u(1−u), so that feet lift off and touch down steeply enough to clear stones. In F the free
+//! control points are bounded as well (see `planner::problem`).
 //!
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
 //! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
@@ -24,7 +24,7 @@ use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;
 
-/// Share of the parabola that is asked for away from the middle.
+/// Fraction of the parabola that is required away from the middle.
 const FALL_OFF: f64 = 0.5;
 
 /// Where a row acts.
@@ -34,7 +34,7 @@ enum At {
     Point { foot: usize, n: usize, u: f64, apex: bool, sample: f64 },
 }
 
-/// Swinging feet over the ground.
+/// The clearance of swinging feet.
 #[derive(Clone, Debug)]
 pub struct SwingClearance {
     clearance: f64,

@@ -19,7 +19,7 @@ pub struct NodeCurvature {
     pub base_position: Vec<Vector3<f64>>,
     /// ∂L/∂R by sample.
     pub base_rotation: Vec<Matrix3<f64>>,
-    /// ∂L/∂p and ∂L/∂R half way from each sample to the next, as in [`State::base_between`].
+    /// ∂L/∂p and ∂L/∂R halfway from each sample to the next, as in [`State::base_between`].
     pub base_between: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// ∂L/∂p_i, `[foot][stance]`.
     pub contacts: Vec<Vec<Vector3<f64>>>,
@@ -101,7 +101,7 @@ impl NodeCurvature {
         *by_rotation += rotation;
     }
 
-    /// Adds what other terms have added to another one.
+    /// Adds the weights that another instance has accumulated.
     pub fn merge(&mut self, other: &Self) {
         fn sum<T: Copy + std::ops::AddAssign>(to: &mut [T], from: &[T]) {
             to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
@@ -126,7 +126,7 @@ impl NodeCurvature {
     }
 
     /// Adds part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
-    /// base, 1 what is due to switches, 2 the feet.
+    /// base, 1 the nodes that depend on switches, 2 the feet.
     pub fn scatter(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
         match part {
             0 => self.scatter_bases(model, state, sink),

@@ -22,7 +22,7 @@ pub const CONE_ROUNDING: f64 = 2e-3;
 /// Least normal force of a standing foot that does not adhere, in m g, away from the switches.
 pub const LEAST_NORMAL_FORCE: f64 = 0.02;
 
-/// Points of the torso's underside at which its clearance is asked for, along x and y.
+/// Points of the torso's underside at which its clearance is constrained, along x and y.
 pub const UNDERSIDE: [usize; 2] = [5, 3];
 
 /// Robot, ground, space and layout. Units of the NLP: m, s, forces in m g, torques in m g · 1 m.
@@ -36,7 +36,7 @@ pub struct Model {
     pub nominal: Vec<Vector3<f64>>,
     /// By foot.
     pub reach: Vec<Box3>,
-    /// By foot, where the robot's file knows it.
+    /// By foot, where the robot's file describes the leg.
     pub legs: Vec<Option<Leg>>,
     /// By foot.
     pub foot_names: Vec<String>,
@@ -55,7 +55,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Puts a scenario together.
+    /// The model of a scenario.
     pub fn new(
         scenario: &Scenario,
         robot: &Robot,

@@ -1,4 +1,4 @@
-//! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
+//! The plan: the result, sampled in ambient space and as exact splines (`NAME.plan.npz`, schema 1).
 
 pub mod exact;
 mod read;
@@ -21,7 +21,7 @@ pub type NamedArray = (String, Vec<usize>, Vec<f64>);
 pub struct Plan {
     /// (N,) s.
     pub t: Vec<f64>,
-    /// (N,) centre of mass, m.
+    /// (N,) center of mass, m.
     pub base_position: Vec<[f64; 3]>,
     /// (N,) body to world, w x y z.
     pub base_quaternion_wxyz: Vec<[f64; 4]>,
@@ -95,7 +95,7 @@ pub struct GroundGrid {
     pub spacing: [f64; 2],
     /// Heights, m.
     pub height: Vec<f64>,
-    /// The same grid before smoothing, where the input was a raster or mesh.
+    /// The same grid before smoothing, where the input was a raster.
     pub raw: Option<Vec<f64>>,
 }
 
@@ -110,7 +110,7 @@ pub struct Meta {
     pub created: String,
     /// `warped` or `direct`.
     pub formulation: String,
-    /// Samples a second.
+    /// Samples per second.
     pub sample_rate_hz: f64,
     /// The whole scenario, overrides included, as TOML.
     pub scenario: String,
@@ -121,7 +121,7 @@ pub struct Meta {
     pub limits: Option<MetaLimits>,
     /// How the solve went.
     pub solver: MetaSolver,
-    /// What the check said.
+    /// The results of the check.
     pub checks: Vec<CheckRow>,
     /// File name → SHA-256.
     pub inputs: std::collections::BTreeMap<String, String>,
@@ -134,7 +134,7 @@ pub struct MetaRobot {
     pub name: String,
     /// kg.
     pub mass: f64,
-    /// kg m², about the centre of mass, base frame.
+    /// kg m², about the center of mass, base frame.
     pub inertia: [[f64; 3]; 3],
     /// ν.
     pub friction: f64,
@@ -166,7 +166,7 @@ pub struct MetaLimits {
 /// `meta.solver`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MetaSolver {
-    /// In words.
+    /// How the solve ended, in words.
     pub status: String,
     /// Every constraint of the NLP holds to the tolerance.
     pub success: bool,
@@ -183,11 +183,11 @@ pub struct MetaSolver {
 pub struct CheckRow {
     /// Which law.
     pub name: String,
-    /// What was found, at its worst.
+    /// Its worst value.
     pub value: f64,
     /// Its unit.
     pub unit: String,
-    /// The largest value allowed.
+    /// The largest allowed value.
     pub limit: f64,
     /// Verdict: value ≤ limit.
     pub passed: bool,

@@ -15,7 +15,7 @@ impl Plan {
     /// wrong shape or dtype, a value that is not finite, a newer schema, a file cut short.
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = NpzReader::open(path)?;
-        // First, so that a plan of a newer schema is refused as such and not for what that schema changed.
+        // First, so that a newer schema is refused as such and not for what it changed.
         let meta = read_meta(&mut npz)?;
 
         let (shape, t) = npz.finite_f64("t")?;

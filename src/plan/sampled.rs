@@ -1,4 +1,4 @@
-//! A plan from a motion: everything at ten times the rate of the NLP's samples, in ambient space.
+//! A plan from a motion: everything at ten times the sample rate of the NLP, in ambient space.
 
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -27,9 +27,9 @@ pub struct Provenance<'a> {
     pub robot: &'a Robot,
     /// The ground.
     pub ground: &'a Ground,
-    /// Files that went in, by name, with their SHA-256.
+    /// Input files by name, with their SHA-256.
     pub inputs: BTreeMap<String, String>,
-    /// s spent on the map.
+    /// Time spent on the map, s.
     pub map_seconds: f64,
 }
 
@@ -176,7 +176,7 @@ impl Plan {
     }
 }
 
-/// The variables by set, in the space they were optimised in (forces in N), with the knots of each spline.
+/// The variables by set, in the space they were optimized in (forces in N), with the knots of each spline.
 fn splines(motion: &Motion) -> Vec<(String, Vec<usize>, Vec<f64>)> {
     let (model, x) = (&motion.model, &motion.x);
     let layout = &model.layout;

@@ -96,8 +96,8 @@ impl Plan {
         ]
     }
 
-    /// Whether every array has its length and every value is finite: what the reader would refuse is an error of the
-    /// program, and better met before the file is there.
+    /// Refuses arrays of the wrong length and values that are not finite: the reader would refuse them, so it is better to fail
+    /// before the file exists.
     pub(crate) fn ensure_sound(&self) -> Result<()> {
         let (n, e) = (self.t.len(), self.foot_names.len());
         let base = self.base_members().map(|(name, values)| (name, n, values));

@@ -85,7 +85,7 @@ impl<'a> BasePath<'a> {
     }
 }
 
-/// Heading at the start: the scenario's, or towards the goal.
+/// Heading at the start: the scenario's, or toward the goal.
 pub fn start_yaw(scenario: &Scenario) -> f64 {
     scenario.start.yaw.unwrap_or_else(|| {
         let d = [0, 1].map(|c| scenario.goal.position[c] - scenario.start.position[c]);
@@ -210,7 +210,7 @@ fn foothold_under(model: &Model, i: usize, y: &[f64; 6]) -> Vector3<f64> {
     match &model.space {
         Space::Direct => Vector3::new(q.x, q.y, model.ground.height(q.x, q.y)),
         Space::Warped(map) => {
-            // Nominal as seen in F, scaled as lengths are there, if the ambient point has no preimage.
+            // If the ambient point has no preimage: the nominal offset in F, scaled like lengths there.
             let [x, y] = map.ground_inverse([q.x, q.y]).unwrap_or_else(|_| {
                 let scale = point.jacobian.determinant().abs().cbrt();
                 let offset = euler(&Vector3::new(0.0, 0.0, y[5])).rotation * model.nominal[i] / scale;

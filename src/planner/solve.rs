@@ -65,7 +65,7 @@ impl Task<'_> {
     }
 }
 
-/// An iteration, for people who wait.
+/// An iteration, for progress displays.
 #[derive(Clone, Debug)]
 pub struct Progress<'a> {
     /// What is being solved.
@@ -159,9 +159,9 @@ impl<'a> Solve<'a> {
 
     /// Solves from the guess with at most `budget` iterations.
     ///
-    /// Where legs are known, first to a feasible point without their joints, whose speeds and torques at the guess may be anything:
-    /// out of the pit this takes a third of the iterations that all at once take, and converges where that does not
-    /// (docs/results.md).
+    /// Where legs are described, the first stage finds a feasible point without their joints, whose speeds and torques are
+    /// arbitrary at the guess. Out of the pit this takes a third of the iterations of solving everything at once, and converges
+    /// where that does not (docs/results.md).
     fn plain(&mut self, budget: usize) -> Result<StageEnd> {
         let model = self.task.model()?;
         let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
@@ -178,7 +178,7 @@ impl<'a> Solve<'a> {
         self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
     }
 
-    /// The terrain at 1/n, 2/n, … of its height, each solved to a feasible point from the last, the whole one with the costs.
+    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the costs.
     fn continuation(&mut self, steps: u32, failed: StageEnd) -> Result<StageEnd> {
         let scenario = self.task.scenario;
         let mut last = failed;
@@ -257,7 +257,7 @@ impl<'a> Solve<'a> {
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
         let solution = ipopt::solve(&mut problem, &options, None, &mut |record, x| {
             let iteration = record.iteration + before;
-            // A later stage starts at the point where the one before it ended, which has its row.
+            // A later stage starts at the point where the one before it ended, which already has its row.
             if record.iteration > 0 || history.is_empty() {
                 let seconds = record.seconds + seconds_before;
                 history.push(IterationRecord { iteration, seconds, ..record.clone() });
