@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpgait import InputError
+from warpgait.arrays import Array
 from warpgait.kinematics import legs
 from warpgait.model import find_model, foot_names, indices, load_spec, stand
-from warpgait.plan import Array
 from warpgait.reach import largest_cuboid
 from warpgait.robots import derive, to_toml
 

@@ -16,7 +16,7 @@ import pytest
 import warpgait
 from crawl import altered
 from warpgait import _native
-from warpgait.plan import load as load_samples
+from warpgait.plan import read_plan
 
 # A short trot over ripples; a few iterations make a motion with everything in it, though not a solved one.
 SCENARIO = """
@@ -47,7 +47,7 @@ def trajectory(request: pytest.FixtureRequest) -> warpgait.Trajectory:
 def test_the_exact_motion_goes_through_the_samples_of_the_file(trajectory: warpgait.Trajectory, tmp_path: Path) -> None:
     path = tmp_path / "a.plan.npz"
     trajectory.save(path)
-    plan, exact = load_samples(path), warpgait.load(path)
+    plan, exact = read_plan(path), warpgait.load(path)
     assert exact.foot_names == plan.foot_names == ("LF", "RF", "LH", "RH")
     assert exact.duration == pytest.approx(plan.duration) == 2.0
     assert (exact.t == plan.t).all()

@@ -11,17 +11,32 @@ import pytest
 
 from crawl import altered
 from warpgait import InputError
-from warpgait.plan import load
+from warpgait.plan import read_plan
 from warpgait.reference import sample
 
 
 def test_a_plan_is_read(standing_plan: Path) -> None:
-    plan = load(standing_plan)
+    plan = read_plan(standing_plan)
     assert plan.foot_names == ("LF", "RF", "LH", "RH")
     assert plan.duration == pytest.approx(1.0)
     assert plan.robot.name == "anymal_b"
     assert plan.foot_force[:, :, 2].sum(1) == pytest.approx(plan.weight, rel=1e-3)
-    assert plan.pull_limit == 1.2  # the default: its scenario says nothing
+    assert plan.pull_limit == 0.0  # no foot is adhesive
+
+
+def adhesive(**meta_changes: Any) -> Callable[[dict[str, Any]], None]:
+    """All feet become adhesive, and keys of meta change."""
+
+    def change(a: dict[str, Any]) -> None:
+        a["foot_adhesive"] = np.ones(4, bool)
+        a["meta"] = meta(**meta_changes)(a["meta"])
+
+    return change
+
+
+def test_the_pull_limit_is_the_plans(standing_plan: Path, tmp_path: Path) -> None:
+    plan = altered(standing_plan, tmp_path / "sticky.plan.npz", adhesive(limits={"pull_limit": 0.9}))
+    assert read_plan(plan).pull_limit == 0.9
 
 
 def poke(member: str, value: Any) -> Callable[[dict[str, Any]], None]:
@@ -54,12 +69,14 @@ def meta(**changes: Any) -> Callable[[Any], Any]:
         (poke("meta", meta(schema="one")), ["schema"]),
         (poke("meta", meta(robot={"name": "anymal_b"})), ["robot", "mass"]),
         (poke("meta", meta(robot=[])), ["robot"]),
+        (adhesive(limits={}), ["meta", "limits.pull_limit", "solve it again"]),
+        (adhesive(limits={"pull_limit": "strong"}), ["limits.pull_limit", "strong"]),
     ],
 )
 def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: Any, words: list[str]) -> None:
     bad = altered(standing_plan, tmp_path / "bad.plan.npz", change)
     with pytest.raises(InputError) as caught:
-        load(bad)
+        read_plan(bad)
     for word in ["bad.plan.npz", *words]:
         assert word in str(caught.value)
 
@@ -67,7 +84,7 @@ def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: 
 def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) -> None:
     whole = standing_plan.read_bytes()
     for name, content, words in (
-        ("half", whole[: len(whole) // 2], "cut short"),
+        ("half", whole[: len(whole) // 2], "truncated"),
         ("empty", b"", "an empty file"),
         ("text", b"hello", "not an .npz archive; a plan is a"),
         ("rot", whole[:2000] + b"x" * 500 + whole[2500:], "damaged"),
@@ -75,18 +92,18 @@ def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) 
         path = tmp_path / f"{name}.plan.npz"
         path.write_bytes(content)
         with pytest.raises(InputError, match=f"{name}.*{words}"):
-            load(path)
+            read_plan(path)
     with pytest.raises(InputError, match="a folder"):
-        load(tmp_path)
+        read_plan(tmp_path)
     with pytest.raises(InputError, match="no such file"):
-        load(tmp_path / "missing.plan.npz")
+        read_plan(tmp_path / "missing.plan.npz")
     np.save(tmp_path / "array.npy", np.zeros(3))
     with pytest.raises(InputError, match="single NumPy array"):
-        load(tmp_path / "array.npy")
+        read_plan(tmp_path / "array.npy")
 
 
 def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
-    plan = load(ripple_plan)
+    plan = read_plan(ripple_plan)
     reference = sample(plan, 1.0 / plan.t[1], 0.03)
     assert np.allclose(reference.com, plan.base_position)
     assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.center_direction)
@@ -99,7 +116,7 @@ def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
 
 
 def test_feet_do_not_follow_every_stone_that_they_pass(ripple_plan: Path) -> None:
-    plan = load(ripple_plan)
+    plan = read_plan(ripple_plan)
     rng = np.random.default_rng(0)
     shaken = np.where(plan.foot_contact[..., None], plan.foot_normal, rng.normal(size=plan.foot_normal.shape))
     direction = replace(plan, foot_normal=shaken).center_direction
