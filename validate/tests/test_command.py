@@ -57,7 +57,7 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     other = crawl.altered(standing_plan, tmp_path / "towr.plan.npz", rename)
     assert main([str(other)]) == 2
     assert "no full model" in capsys.readouterr().err
-    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file
+    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file, not a folder
     assert "cannot make this folder for the reports" in capsys.readouterr().err
     assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
@@ -103,7 +103,7 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
 
 
 def test_a_missing_opengl_loses_only_the_pictures(standing_plan: Path, tmp_path: Path) -> None:
-    """MuJoCo itself cannot be imported with such a setting."""
+    """With this setting, MuJoCo itself cannot be imported."""
     command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]
     environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Plans are read, or refused with file, member and reason."""
+"""Plans are read, or refused with file, member and reason; and they are sampled at the control rate."""
 
 import json
 from collections.abc import Callable
@@ -81,7 +81,7 @@ def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: 
         assert word in str(caught.value)
 
 
-def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) -> None:
+def test_files_that_are_not_plans_are_refused(standing_plan: Path, tmp_path: Path) -> None:
     whole = standing_plan.read_bytes()
     for name, content, words in (
         ("half", whole[: len(whole) // 2], "truncated"),
@@ -109,13 +109,13 @@ def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
     assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.center_direction)
     assert (reference.contact == plan.foot_contact).all()
     between = sample(plan, 500.0, 0.03)
-    # The velocity it reports is that of the positions it reports, between the plan's samples too.
+    # Between the plan's samples too, its velocities are those of its positions.
     moved = np.gradient(between.foot, between.t, axis=0)
     assert np.abs(moved - between.foot_velocity)[2:-2].max() < 0.02
     assert between.t[-1] == pytest.approx(plan.duration)
 
 
-def test_feet_do_not_follow_every_stone_that_they_pass(ripple_plan: Path) -> None:
+def test_swinging_feet_ignore_the_normals_of_the_ground_below(ripple_plan: Path) -> None:
     plan = read_plan(ripple_plan)
     rng = np.random.default_rng(0)
     shaken = np.where(plan.foot_contact[..., None], plan.foot_normal, rng.normal(size=plan.foot_normal.shape))

@@ -1,4 +1,4 @@
-"""Feet that roll."""
+"""Rolling feet."""
 
 from pathlib import Path
 

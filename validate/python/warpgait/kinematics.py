@@ -31,7 +31,7 @@ class Leg:
     lateral: float  # foot to the left (+y) of the HAA axis
     thigh: float  # HFE to KFE, in the leg's plane
     shank: float  # KFE to the foot's center, in the leg's plane
-    thigh_zero: float  # rad, from -z towards +x, at zero joint angles
+    thigh_zero: float  # rad, from -z toward +x, at zero joint angles
     shank_zero: float
     bend: float  # +1: the shank points further forward than the thigh (front legs), -1: further back
     lower: Array  # (3,) rad
@@ -54,7 +54,7 @@ class Leg:
         reachable &= np.abs(cosine) <= 1.0
         knee = self.bend * np.arccos(np.clip(cosine, -1.0, 1.0))
         thigh = np.arctan2(x, -z) - np.arctan2(self.shank * np.sin(knee), self.thigh + self.shank * np.cos(knee))
-        # A positive rotation about +y turns -z towards -x, hence the signs.
+        # A positive rotation about +y turns -z toward -x, hence the signs.
         hfe = _wrap(self.thigh_zero - thigh)
         kfe = _wrap(self.shank_zero - self.thigh_zero - knee)
         return np.stack([haa, hfe, kfe], -1), reachable

@@ -122,7 +122,7 @@ def _film(pictures: list[tuple[float, bytes]]) -> str:
 
 def _trial(trial: Trial) -> list[str]:
     """Verdict, metrics and incidents of a trial."""
-    title, word = _title(trial.name) + ("" if trial.counts else " (does not count towards the verdict)"), trial.verdict.word
+    title, word = _title(trial.name) + ("" if trial.counts else " (does not count toward the verdict)"), trial.verdict.word
     parts = [f'<h2>{title}: <span class="{word}">{word}</span></h2>{_table(trial.metrics)}']
     if trial.incidents:
         items = "".join(f"<li>{escape(str(i))}</li>" for i in sorted(trial.incidents, key=lambda i: i.time))

@@ -33,7 +33,7 @@ class Trial:
     """One simulated replay and its judgment."""
 
     name: str
-    counts: bool  # towards the verdict
+    counts: bool  # toward the verdict
     terrain: Heightfield
     reference: Reference
     replay: Replay
