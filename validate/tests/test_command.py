@@ -1,5 +1,6 @@
 """The command: files, exit codes, messages."""
 
+import importlib.metadata
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 import crawl
 from warpgait import film
+from warpgait.settings import MUJOCO_VERSION
 from warpgait.validate import main
 
 
@@ -118,6 +120,10 @@ def test_without_ffmpeg_there_is_a_message_and_no_film(
     assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion", "--no-pictures", "--video"]) == 0
     assert "ffmpeg" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_the_package_requires_the_version_of_mujoco_that_it_was_calibrated_with() -> None:
+    assert f"mujoco=={MUJOCO_VERSION}" in (importlib.metadata.requires("warpgait") or [])
 
 
 def test_a_missing_mujoco_is_a_message(standing_plan: Path, tmp_path: Path) -> None:

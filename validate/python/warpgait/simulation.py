@@ -129,9 +129,10 @@ class Simulation:
         """One control step and its physics steps. Negative steps settle on the first sample of the reference and are not recorded."""
         k, time = max(step, 0), step * self._period
         self._push(time)
-        touching, torque = self._measure_and_control(k)
+        touching, measured = self._measure()
+        torque = self._control(k, measured)
         sample = self._observe(k, torque)
-        stray = self._advance(sample)
+        stray = self._step(sample)
         if self._blew_up():
             self._fall = Incident(max(time, 0.0), "the simulation blew up")
             return
@@ -146,17 +147,19 @@ class Simulation:
         force, push = self._data.xfrc_applied[self._index.base, :3], self._disturbance.push
         force[:] = push[2:] if push and push[0] <= time < push[0] + push[1] else 0.0
 
-    def _measure_and_control(self, k: int) -> tuple[Bools, Array]:
-        """Which feet touch the ground (E,), and the motors' torques (E, 3) N m, which are set."""
-        data = self._data
-        mujoco.mj_step1(self._world, data)
-        touching = self._contacts.detect(data)
-        measured = self._measurement.take(data.qpos, data.qvel, touching)
+    def _measure(self) -> tuple[Bools, Bools]:
+        """Which feet touch the ground (E,), and which ones the controller sees there. The measured state is in `_measurement.data`."""
+        mujoco.mj_step1(self._world, self._data)
+        touching = self._contacts.detect(self._data)
+        return touching, self._measurement.take(self._data.qpos, self._data.qvel, touching)
+
+    def _control(self, k: int, measured: Bools) -> Array:
+        """Set the motors and the feet's adhesion; returns the torques (E, 3) N m that the controller asks for."""
         torque = self._controller.torque(k, self._measurement.data, measured)
-        data.ctrl[self._index.actuator.ravel()] = torque.ravel()
+        self._data.ctrl[self._index.actuator.ravel()] = torque.ravel()
         for e, actuator in self._contacts.adhesion:
-            data.ctrl[actuator] = float(self._reference.contact[k, e])
-        return touching, torque
+            self._data.ctrl[actuator] = float(self._reference.contact[k, e])
+        return torque
 
     def _observe(self, k: int, torque: Array) -> _Sample:
         """The state at the beginning of the control step; `force`, `slip` and `stray_contacts` are not known yet."""
@@ -174,7 +177,7 @@ class Simulation:
             stray_contacts=0,
         )
 
-    def _advance(self, sample: _Sample) -> list[int]:
+    def _step(self, sample: _Sample) -> list[int]:
         """Physics to the end of the control step. Adds the contact forces to `sample`; returns other geoms that touch the ground."""
         mujoco.mj_step2(self._world, self._data)
         sample.force, stray = self._contacts.forces(self._data)

@@ -154,7 +154,7 @@ class _Trials:
         if settings.raw and plan.terrain_raw is not None:
             name = "closed loop, raw terrain"
             say(name)
-            raw = world_of(plan, self.robot, plan.terrain_raw, settings)
+            raw = _world_of(plan, self.robot, plan.terrain_raw, settings)
             trials.append(self._trial(name, True, plan.terrain_raw, raw, self.reference, self._whole_body()))
         if settings.second_opinion:
             name = "second opinion: joint PD"
@@ -181,7 +181,7 @@ class _Trials:
         return Trial(name, counts, terrain, reference, replay, metrics, incidents)
 
 
-def world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Settings) -> Any:
+def _world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Settings) -> Any:
     """The MuJoCo model of the robot on `terrain`."""
     friction, gravity = plan.robot.friction, plan.robot.gravity
     return build_world(robot.path, terrain, friction, gravity, robot.adhesive, robot.adhesion, settings.disturbance)
@@ -194,7 +194,7 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     check_mujoco()
     robot = _robot(plan, settings.model)
     say("open loop")
-    world = world_of(plan, robot, plan.terrain, settings)
+    world = _world_of(plan, robot, plan.terrain, settings)
     index = indices(world, plan.foot_names)
     analysis = analyze(plan, robot.model, world, index)
     metrics, incidents = judge_open_loop(plan, analysis, robot.index)
