@@ -20,7 +20,7 @@ from .reference import Reference
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
-EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touchdown
+EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touch-down
 
 _UNBOUNDED = 1e30  # DAQP's infinity
 _EQUALITY = 5  # DAQP's flags: active and immutable
@@ -84,7 +84,7 @@ class StepOver:
         self._risen = np.zeros(reference.contact.shape[1])
 
     def update(self, k: int, touching: Bools) -> tuple[Array, Array]:
-        """Rise (E,) m of the feet's targets along the normal, and its speed (E,) m/s. It is zero again at touchdown. Call once a step."""
+        """Rise (E,) m of the feet's targets along the normal, and its speed (E,) m/s. It is zero again at touch-down. Call once a step."""
         s, stance = self._progress[k], self._contact[k]
         self._met = ~stance & (self._met | (touching & (s > EDGE_WINDOW[0]) & (s < EDGE_WINDOW[1])))
         rising = self._met & (self._risen < self._limit)

@@ -112,7 +112,7 @@ class Plan:
     def center_direction(self) -> Array:
         """(N, E, 3) unit vectors from the contact points to the feet's centers.
 
-        In stance this is the terrain's normal. In a swing it turns smoothly from the normal at lift-off to that at touchdown; the normal of
+        In stance this is the terrain's normal. In a swing it turns smoothly from the normal at lift-off to that at touch-down; the normal of
         the terrain below would shake the foot at every stone that it passes.
         """
         direction = self.foot_normal.copy()

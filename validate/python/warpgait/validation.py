@@ -24,7 +24,7 @@ from .scene import build_world
 from .settings import PHYSICS_RATE, Settings
 from .simulation import Simulation
 
-ADHESION_RESERVE = 1.1  # strength of the simulated adhesion, as a multiple of the largest pull that the plan may use
+ADHESION_FACTOR = 1.1  # strength of the simulated adhesion, as a multiple of the largest pull that the plan may use
 NOTED_MASS_ERROR = 0.01  # fraction by which the masses of plan and model may differ without a note
 
 
@@ -104,7 +104,7 @@ class _Robot:
     @property
     def preload(self) -> Array:
         """Adhesion (E,) N that adds to the normal force in the friction law."""
-        return self.pull * ADHESION_RESERVE
+        return self.pull * ADHESION_FACTOR
 
 
 def _robot(plan: Plan, model: str | None) -> _Robot:
@@ -117,7 +117,7 @@ def _robot(plan: Plan, model: str | None) -> _Robot:
     limit = plan.pull_limit * plan.weight
     adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
     pull = np.where(plan.foot_adhesive, limit, 0.0)
-    return _Robot(path, own, indices(own, plan.foot_names), pull, adhesive, limit * ADHESION_RESERVE)
+    return _Robot(path, own, indices(own, plan.foot_names), pull, adhesive, limit * ADHESION_FACTOR)
 
 
 def _notes(plan: Plan, robot: _Robot) -> list[str]:
