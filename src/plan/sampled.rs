@@ -5,12 +5,15 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 
-use super::{GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, Plan, WarpedSamples};
+use super::{GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedSamples};
+use crate::ipopt::IterationRecord;
+use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
 use crate::robot::Robot;
 use crate::scenario::{Formulation, Scenario};
 use crate::terrain::Ground;
+use crate::trajectory::layout::{FootVariables, Layout};
 use crate::trajectory::sampling;
 use crate::trajectory::space::Space;
 
@@ -81,22 +84,8 @@ impl Plan {
 
     /// Everything but the samples.
     fn empty(motion: &Motion, provenance: &Provenance) -> Self {
-        let (model, scenario, robot) = (&motion.model, provenance.scenario, provenance.robot);
-        let field = &provenance.ground.field;
-        let grid = field.grid();
-        let step = model.layout.time_step;
-        let phase_durations = model
-            .layout
-            .feet
-            .iter()
-            .map(|foot| {
-                let edges: Vec<f64> =
-                    foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
-                edges.windows(2).map(|e| (e[1] - e[0]) * step).collect()
-            })
-            .collect();
-        let history =
-            |value: fn(&crate::ipopt::IterationRecord) -> f64| motion.history.iter().map(value).collect();
+        let model = &motion.model;
+        let history = |value: fn(&IterationRecord) -> f64| motion.history.iter().map(value).collect();
         Self {
             t: vec![],
             base_position: vec![],
@@ -114,16 +103,9 @@ impl Plan {
             foot_names: model.foot_names.clone(),
             foot_adhesive: model.adhesive.clone(),
             warped: None,
-            phase_durations,
+            phase_durations: phase_durations(&model.layout),
             splines: splines(motion),
-            ground: GroundGrid {
-                rows: grid.rows,
-                columns: grid.columns,
-                origin: grid.origin,
-                spacing: grid.spacing,
-                height: field.samples().to_vec(),
-                raw: provenance.ground.raw.clone(),
-            },
+            ground: ground_grid(provenance.ground),
             map: match &model.space {
                 Space::Direct => None,
                 Space::Warped(map) => Some(map.to_grid()),
@@ -131,48 +113,84 @@ impl Plan {
             history_objective: history(|r| r.objective),
             history_constraint_violation: history(|r| r.violation),
             history_seconds: history(|r| r.seconds),
-            meta: Meta {
-                schema: 1,
-                warpgait_version: env!("CARGO_PKG_VERSION").into(),
-                created: rfc3339(SystemTime::now()),
-                formulation: match scenario.formulation {
-                    Formulation::Warped => "warped".into(),
-                    Formulation::Direct => "direct".into(),
-                },
-                sample_rate_hz: SAMPLES_A_STEP as f64 / step,
-                scenario: provenance.text.into(),
-                robot: MetaRobot {
-                    name: robot.name.clone(),
-                    mass: robot.mass,
-                    inertia: robot.inertia,
-                    friction: scenario.contact.friction,
-                    gravity: [0.0, 0.0, -GRAVITY],
-                    reach: model.reach.clone(),
-                    torso: robot.torso,
-                },
-                limits: Some(MetaLimits {
-                    force_limit: scenario.motion.force_limit,
-                    pull_limit: scenario.motion.pull_limit,
-                    swing_clearance: scenario.motion.swing_clearance,
-                    base_clearance: scenario.motion.base_clearance,
-                    friction: scenario.contact.friction,
-                    friction_margin: scenario.contact.friction_margin,
-                }),
-                solver: MetaSolver {
-                    status: motion.status.clone(),
-                    success: motion.solved,
-                    iterations: motion.iterations,
-                    max_violation: motion.max_violation(),
-                    seconds: Seconds {
-                        map: provenance.map_seconds,
-                        total: motion.seconds.total + provenance.map_seconds,
-                        ..motion.seconds
-                    },
-                },
-                checks: vec![],
-                inputs: provenance.inputs.clone(),
-            },
+            meta: meta(motion, provenance),
         }
+    }
+}
+
+/// Stance and swing durations by foot, s.
+fn phase_durations(layout: &Layout) -> Vec<Vec<f64>> {
+    let of = |foot: &FootVariables| {
+        let edges: Vec<f64> = foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
+        edges.windows(2).map(|e| (e[1] - e[0]) * layout.time_step).collect()
+    };
+    layout.feet.iter().map(of).collect()
+}
+
+fn ground_grid(ground: &Ground) -> GroundGrid {
+    let grid = ground.field.grid();
+    GroundGrid {
+        rows: grid.rows,
+        columns: grid.columns,
+        origin: grid.origin,
+        spacing: grid.spacing,
+        height: ground.field.samples().to_vec(),
+        raw: ground.raw.clone(),
+    }
+}
+
+fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
+    let (model, scenario) = (&motion.model, provenance.scenario);
+    Meta {
+        schema: PLAN_SCHEMA,
+        warpgait_version: env!("CARGO_PKG_VERSION").into(),
+        created: rfc3339(SystemTime::now()),
+        formulation: match scenario.formulation {
+            Formulation::Warped => "warped".into(),
+            Formulation::Direct => "direct".into(),
+        },
+        sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,
+        scenario: provenance.text.into(),
+        robot: meta_robot(model, provenance),
+        limits: Some(limits(scenario)),
+        solver: MetaSolver {
+            status: motion.status.clone(),
+            success: motion.solved,
+            iterations: motion.iterations,
+            max_violation: motion.max_violation(),
+            seconds: Seconds {
+                map: provenance.map_seconds,
+                total: motion.seconds.total + provenance.map_seconds,
+                ..motion.seconds
+            },
+        },
+        checks: vec![],
+        inputs: provenance.inputs.clone(),
+    }
+}
+
+fn meta_robot(model: &Model, provenance: &Provenance) -> MetaRobot {
+    let robot = provenance.robot;
+    MetaRobot {
+        name: robot.name.clone(),
+        mass: robot.mass,
+        inertia: robot.inertia,
+        friction: provenance.scenario.contact.friction,
+        gravity: [0.0, 0.0, -GRAVITY],
+        reach: model.reach.clone(),
+        torso: robot.torso,
+    }
+}
+
+fn limits(scenario: &Scenario) -> MetaLimits {
+    let (motion, contact) = (&scenario.motion, &scenario.contact);
+    MetaLimits {
+        force_limit: motion.force_limit,
+        pull_limit: motion.pull_limit,
+        swing_clearance: motion.swing_clearance,
+        base_clearance: motion.base_clearance,
+        friction: contact.friction,
+        friction_margin: contact.friction_margin,
     }
 }
 
