@@ -132,7 +132,7 @@ impl Prepared {
 pub struct Planned {
     /// What it was planned from.
     pub prepared: Prepared,
-    /// The map, in the warped formulation.
+    /// The map, in all formulations but the direct one.
     pub map: Option<BuiltMap>,
     /// The plan, with the results of the check.
     pub plan: Plan,
@@ -160,14 +160,16 @@ pub fn run(
     let start = Instant::now();
     let map = match scenario.formulation {
         Formulation::Direct => None,
-        Formulation::Warped => match build_map(&prepared.surface, &scenario.map, true, observer)? {
-            Some(built) => {
-                built.report.ensure_injective()?;
-                built.report_warnings(observer);
-                Some(built)
+        Formulation::Warped | Formulation::Hybrid => {
+            match build_map(&prepared.surface, &scenario.map, true, observer)? {
+                Some(built) => {
+                    built.report.ensure_injective()?;
+                    built.report_warnings(observer);
+                    Some(built)
+                }
+                None => return Ok(None),
             }
-            None => return Ok(None),
-        },
+        }
     };
     let map_seconds = start.elapsed().as_secs_f64();
     let task = prepared.task(loaded, map.as_ref().map(|built| &built.map));

@@ -27,7 +27,7 @@ const TERRAINS: [&str; 2] = [
 #[test]
 fn free_switches_give_better_motions_that_hold() {
     for terrain in TERRAINS {
-        for formulation in ["warped", "direct"] {
+        for formulation in ["warped", "direct", "hybrid"] {
             let text = |gait: &str| {
                 format!("formulation = \"{formulation}\"\nhorizon = 4.0\n[terrain]\n{terrain}[gait]\n{gait}")
             };

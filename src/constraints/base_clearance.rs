@@ -73,7 +73,7 @@ impl Constraint for BaseClearance {
             let (base, node) = (&state.base[*k], &model.layout.base[*k]);
             let (arm, _, _, by_q) = point(model, base, b);
             // dq = dp + δ × R b.
-            Tangent::position(model, &base.point, node).add_along(&by_q, &mut sink.row(first + r));
+            Tangent::base(model, base, node).add_along(&by_q, &mut sink.row(first + r));
             Tangent::turn(model, base, node).add_along(&arm.cross(&by_q), &mut sink.row(first + r));
         }
     }
@@ -103,7 +103,7 @@ impl Constraint for BaseClearance {
                 both += form * by_turn;
                 turns += by_turn.transpose() * form * by_turn;
             }
-            let position = Tangent::position(model, &base.point, node);
+            let position = Tangent::base(model, base, node);
             let turn = Tangent::turn(model, base, node);
             position.quadratic(&moves, sink);
             position.cross(&both, &turn, sink);

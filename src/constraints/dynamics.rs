@@ -170,7 +170,7 @@ impl Constraint for Dynamics {
                     let by_force = Tangent::force(model, contact, force_node);
                     let warped = state.warped_forces[i][l];
                     let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &warped);
-                    let position = Tangent::position(model, &contact.point, foothold);
+                    let position = Tangent::foot(model, contact, foothold);
                     let (arm_form, force_form) = (cross_matrix(&arm) * weight, -cross_matrix(&f));
                     for c in 0..3 {
                         by_force.add_component(c, weight, &mut sink.row(row + c));
@@ -181,14 +181,14 @@ impl Constraint for Dynamics {
                         position.add_along(&force_form.row(c).transpose(), &mut sink.row(row + 3 + c));
                     }
                 }
-                let position = Tangent::position(model, &base.point, &layout.base[l]);
+                let position = Tangent::base(model, base, &layout.base[l]);
                 let form = cross_matrix(&total);
                 for c in 0..3 {
                     position.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
                 }
             }
             for &(j, coefficient) in &stencil.position {
-                let position = Tangent::position(model, &state.base[j].point, &layout.base[j]);
+                let position = Tangent::base(model, &state.base[j], &layout.base[j]);
                 for c in 0..3 {
                     position.add_component(c, -coefficient * acceleration, &mut sink.row(row + c));
                 }
@@ -254,7 +254,7 @@ impl Constraint for Dynamics {
         for l in 0..self.stencils.len() {
             let (by_force, by_torque) = self.wrench_multipliers(multipliers, l);
             let base = &state.base[l];
-            let base_position = Tangent::position(model, &base.point, &layout.base[l]);
+            let base_position = Tangent::base(model, base, &layout.base[l]);
             let form = -cross_matrix(&by_torque);
             for i in 0..model.feet() {
                 let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
@@ -266,7 +266,7 @@ impl Constraint for Dynamics {
                 curvature.base_position[l] -= by_arm;
                 curvature.forces[i][l] += by_force + by_torque.cross(&arm);
                 let foothold = &layout.feet[i].stances[j].foothold;
-                let position = Tangent::position(model, &contact.point, foothold);
+                let position = Tangent::foot(model, contact, foothold);
                 for force in [
                     Tangent::force(model, contact, force_node),
                     Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][l]),

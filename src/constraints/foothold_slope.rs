@@ -87,7 +87,7 @@ impl Constraint for FootholdSlope {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
             let slope = gradient(&ground(model, contact, d));
-            Tangent::position(model, &contact.point, node).add_along(&slope, &mut sink.row(first + r));
+            Tangent::foot(model, contact, node).add_along(&slope, &mut sink.row(first + r));
         }
     }
 
@@ -105,7 +105,7 @@ impl Constraint for FootholdSlope {
             let ground = ground(model, contact, d);
             curvature.contacts[i][j] += gradient(&ground) * lambda;
             let form = curvature_form(&ground) * lambda;
-            Tangent::position(model, &contact.point, node).quadratic(&form, sink);
+            Tangent::foot(model, contact, node).quadratic(&form, sink);
         }
     }
 

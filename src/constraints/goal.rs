@@ -61,7 +61,7 @@ impl Constraint for Goal {
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         let (base, node) = (&state.base[self.last], &model.layout.base[self.last]);
-        let position = Tangent::position(model, &base.point, node);
+        let position = Tangent::base(model, base, node);
         position.add_component(0, 1.0, &mut sink.row(first));
         position.add_component(1, 1.0, &mut sink.row(first + 1));
         if let Some(yaw) = self.yaw {

@@ -66,8 +66,7 @@ impl Constraint for OnGround {
         for (r, &(i, j)) in self.places.iter().enumerate() {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
-            Tangent::position(model, &contact.point, node)
-                .add_along(&contact.gap().1, &mut sink.row(first + r));
+            Tangent::foot(model, contact, node).add_along(&contact.gap().1, &mut sink.row(first + r));
         }
     }
 
@@ -84,7 +83,7 @@ impl Constraint for OnGround {
             let node = &model.layout.feet[i].stances[j].foothold;
             curvature.contacts[i][j] += contact.gap().1 * lambda;
             let form = height_form(&contact.ground) * -lambda;
-            Tangent::position(model, &contact.point, node).quadratic(&form, sink);
+            Tangent::foot(model, contact, node).quadratic(&form, sink);
         }
     }
 

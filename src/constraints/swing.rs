@@ -104,8 +104,7 @@ impl Constraint for SwingClearance {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::position(model, &foot.point, node)
-                .add_along(&self.distance(state, at).1, &mut sink.row(first + r));
+            Tangent::foot(model, foot, node).add_along(&self.distance(state, at).1, &mut sink.row(first + r));
         }
     }
 
@@ -124,7 +123,7 @@ impl Constraint for SwingClearance {
                 At::Sample { foot, k, .. } => curvature.swings[foot][k] += by_position * lambda,
                 At::Point { foot, n, .. } => curvature.points[foot][n] += by_position * lambda,
             }
-            Tangent::position(model, &foot.point, node).quadratic(&(form * lambda), sink);
+            Tangent::foot(model, foot, node).quadratic(&(form * lambda), sink);
         }
     }
 

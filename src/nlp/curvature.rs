@@ -131,7 +131,7 @@ impl NodeCurvature {
         match part {
             0 => self.scatter_bases(model, state, sink),
             1 => self.scatter_switches(model, state, sink),
-            _ if model.space.is_warped() => self.scatter_feet(model, state, sink),
+            _ if model.spaces.feet.is_warped() => self.scatter_feet(model, state, sink),
             _ => {}
         }
     }
@@ -244,7 +244,7 @@ fn scatter_base(
     let q = by_rotation * base.rotation().transpose();
     let (axis, trace) = (skew_part(&q), q.trace());
     let w = &base.turn.first;
-    let first = if model.space.is_warped() { 0 } else { 3 };
+    let first = if model.spaces.base.is_warped() { 0 } else { 3 };
     for d in first..6 {
         for e in first..=d {
             let mut value =

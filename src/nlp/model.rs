@@ -9,8 +9,7 @@ use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
 use crate::trajectory::layout::KnotSpacing;
-use crate::trajectory::space::Space;
-use crate::trajectory::{Gait, Layout};
+use crate::trajectory::{Gait, Layout, Spaces};
 use crate::{Error, Result};
 
 /// m/s².
@@ -46,8 +45,8 @@ pub struct Model {
     pub underside: Vec<Vector3<f64>>,
     /// The ground.
     pub ground: Arc<Heightfield>,
-    /// The space of the variables.
-    pub space: Space,
+    /// The spaces of the variables.
+    pub spaces: Spaces,
     /// The variables.
     pub layout: Layout,
     /// Threads that evaluate derivatives, 1 or 2.
@@ -61,7 +60,7 @@ impl Model {
         robot: &Robot,
         gait: &Gait,
         ground: Arc<Heightfield>,
-        space: Space,
+        spaces: Spaces,
     ) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         let adhesive_feet = &scenario.robot.adhesive_feet;
@@ -96,7 +95,7 @@ impl Model {
             foot_names,
             underside,
             ground,
-            space,
+            spaces,
             threads: scenario.solver.threads,
             layout: Layout::new(
                 gait,

@@ -155,17 +155,17 @@ impl State {
         let layout = &model.layout;
         let order = if curved { Order::Third } else { Order::Second };
         let foot_at = |node: &LinearNode, order: Order| {
-            let point = model.space.jet(&Vector3::from(node.value::<3>(x)), order);
+            let point = model.spaces.feet.jet(&Vector3::from(node.value::<3>(x)), order);
             FootNode { point, ground: model.ground.jet(point.position.x, point.position.y) }
         };
         for (k, node) in layout.base.iter().enumerate() {
             let y = node.value::<6>(x);
-            let (point, turn) = model.space.pose(&y, curved);
+            let (point, turn) = model.spaces.base.pose(&y, curved);
             self.base[k] = BaseNode { point, turn };
             self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
         }
         for (between, node) in self.base_between.iter_mut().zip(&layout.base_between) {
-            let (point, turn) = model.space.pose(&node.value::<6>(x), curved);
+            let (point, turn) = model.spaces.base.pose(&node.value::<6>(x), curved);
             *between = BaseNode { point, turn };
         }
         for (i, foot) in layout.feet.iter().enumerate() {

@@ -1,12 +1,13 @@
 //! The motion of a plan at any time, exactly: the splines that were optimized, not its samples.
 
+use std::sync::Arc;
+
 use super::{NamedArray, Plan};
 use crate::heightfield::Heightfield;
 use crate::trajectory::layout::Layout;
 use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
-use crate::trajectory::space::Space;
 use crate::trajectory::switches::snapped;
-use crate::trajectory::{Gait, Swing};
+use crate::trajectory::{Gait, Spaces, Swing};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
@@ -17,7 +18,7 @@ const TIME_TOLERANCE: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct ExactMotion {
     layout: Layout,
-    space: Space,
+    spaces: Spaces,
     x: Vec<f64>,
 }
 
@@ -37,7 +38,7 @@ impl ExactMotion {
     /// # Errors
     /// For a time outside the plan.
     pub fn base(&self, t: f64) -> Result<BaseMotion> {
-        Ok(sampling::base(&self.layout, &self.space, &self.x, self.sample(t)?))
+        Ok(sampling::base(&self.layout, &self.spaces.base, &self.x, self.sample(t)?))
     }
 
     /// Foot `i` at `t` in s, world frame, its forces in N.
@@ -48,7 +49,7 @@ impl ExactMotion {
         if i >= self.feet() {
             return Err(Error::input(format!("foot {i}: the plan has {} feet, counted from 0", self.feet())));
         }
-        Ok(sampling::foot(&self.layout, &self.space, &self.x, i, self.sample(t)?))
+        Ok(sampling::foot(&self.layout, &self.spaces.feet, &self.x, i, self.sample(t)?))
     }
 
     /// A time in samples of the NLP; near a sample it is that sample, where a foot's phase may switch.
@@ -125,11 +126,9 @@ impl Plan {
         for foot in 0..self.foot_names.len() {
             self.fill_foot(&layout, foot, &mut x)?;
         }
-        let space = match &self.map {
-            None => Space::Direct,
-            Some(grid) => Space::Warped(Box::new(WarpMap::from_grid(grid)?)),
-        };
-        Ok(ExactMotion { layout, space, x })
+        let map = self.map.as_ref().map(|grid| WarpMap::from_grid(grid).map(Arc::new)).transpose()?;
+        let spaces = Spaces::of(self.meta.formulation, map)?;
+        Ok(ExactMotion { layout, spaces, x })
     }
 
     /// The ground as planned on, as the spline it was.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::planner::Seconds;
 use crate::robot::Box3;
+use crate::scenario::Formulation;
 use crate::warp::MapGrid;
 
 /// Name, shape, values in C order.
@@ -72,14 +73,21 @@ pub struct Plan {
 /// Warped-space counterparts of the samples.
 #[derive(Clone, Debug)]
 pub struct WarpedSamples {
-    /// (N,)
-    pub base_position: Vec<[f64; 3]>,
-    /// (N,) ZYX Euler angles θ̄ as (roll, pitch, yaw), rad.
-    pub base_euler: Vec<[f64; 3]>,
+    /// Those of the base, where it was planned in F.
+    pub base: Option<WarpedBase>,
     /// (N·E,)
     pub foot_position: Vec<[f64; 3]>,
     /// (N·E,) N.
     pub foot_force: Vec<[f64; 3]>,
+}
+
+/// Warped-space counterparts of the base's samples.
+#[derive(Clone, Debug)]
+pub struct WarpedBase {
+    /// (N,)
+    pub position: Vec<[f64; 3]>,
+    /// (N,) ZYX Euler angles θ̄ as (roll, pitch, yaw), rad.
+    pub euler: Vec<[f64; 3]>,
 }
 
 /// A raster of heights: `heightfield[row * columns + column]`, rows along y, columns along x.
@@ -108,8 +116,8 @@ pub struct Meta {
     pub warpgait_version: String,
     /// RFC 3339.
     pub created: String,
-    /// `warped` or `direct`.
-    pub formulation: String,
+    /// The space of the variables.
+    pub formulation: Formulation,
     /// Samples per second.
     pub sample_rate_hz: f64,
     /// The whole scenario, overrides included, as TOML.

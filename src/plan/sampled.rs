@@ -5,17 +5,19 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 
-use super::{GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedSamples};
+use super::{
+    GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedBase, WarpedSamples,
+};
 use crate::ipopt::IterationRecord;
 use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
 use crate::robot::Robot;
-use crate::scenario::{Formulation, Scenario};
+use crate::scenario::Scenario;
 use crate::terrain::Ground;
 use crate::trajectory::layout::{FootVariables, Layout};
 use crate::trajectory::sampling;
-use crate::trajectory::space::Space;
+use crate::warp::WarpMap;
 
 /// Samples of a plan within one time step.
 pub const SAMPLES_A_STEP: usize = 10;
@@ -40,21 +42,16 @@ impl Plan {
     /// Samples a motion. `checks` are left empty.
     pub fn from_motion(motion: &Motion, provenance: &Provenance) -> Self {
         let (model, x) = (&motion.model, &motion.x);
-        let (layout, space) = (&model.layout, &model.space);
+        let (layout, spaces) = (&model.layout, &model.spaces);
         let count = layout.intervals * SAMPLES_A_STEP + 1;
         let unit = model.mass * GRAVITY;
-        let warped = space.is_warped();
         let mut plan = Self::empty(motion, provenance);
-        let mut samples = WarpedSamples {
-            base_position: vec![],
-            base_euler: vec![],
-            foot_position: vec![],
-            foot_force: vec![],
-        };
+        let mut base_in_f = WarpedBase { position: vec![], euler: vec![] };
+        let mut feet_in_f = WarpedSamples { base: None, foot_position: vec![], foot_force: vec![] };
         let mut quaternion = [1.0, 0.0, 0.0, 0.0];
         for n in 0..count {
             let k = n as f64 / SAMPLES_A_STEP as f64;
-            let base = sampling::base(layout, space, x, k);
+            let base = sampling::base(layout, &spaces.base, x, k);
             quaternion = base.quaternion_wxyz(quaternion);
             plan.t.push(k * layout.time_step);
             plan.base_position.push(base.position.into());
@@ -64,21 +61,22 @@ impl Plan {
             plan.base_angular_velocity.push(base.angular_velocity.into());
             plan.base_angular_acceleration.push(base.angular_acceleration.into());
             let [px, py, pz, roll, pitch, yaw] = base.variables;
-            samples.base_position.push([px, py, pz]);
-            samples.base_euler.push([roll, pitch, yaw]);
+            base_in_f.position.push([px, py, pz]);
+            base_in_f.euler.push([roll, pitch, yaw]);
             for i in 0..model.feet() {
-                let foot = sampling::foot(layout, space, x, i, k);
+                let foot = sampling::foot(layout, &spaces.feet, x, i, k);
                 plan.foot_position.push(foot.position.into());
                 plan.foot_velocity.push(foot.velocity.into());
                 plan.foot_acceleration.push(foot.acceleration.into());
                 plan.foot_force.push((foot.force * unit).into());
                 plan.foot_contact.push(foot.contact);
                 plan.foot_normal.push(model.ground.normal(foot.position.x, foot.position.y));
-                samples.foot_position.push(foot.warped_position.into());
-                samples.foot_force.push((foot.warped_force * unit).into());
+                feet_in_f.foot_position.push(foot.warped_position.into());
+                feet_in_f.foot_force.push((foot.warped_force * unit).into());
             }
         }
-        plan.warped = warped.then_some(samples);
+        feet_in_f.base = spaces.base.is_warped().then_some(base_in_f);
+        plan.warped = spaces.feet.is_warped().then_some(feet_in_f);
         plan
     }
 
@@ -106,10 +104,7 @@ impl Plan {
             phase_durations: phase_durations(&model.layout),
             splines: splines(motion),
             ground: ground_grid(provenance.ground),
-            map: match &model.space {
-                Space::Direct => None,
-                Space::Warped(map) => Some(map.to_grid()),
-            },
+            map: model.spaces.map().map(WarpMap::to_grid),
             history_objective: history(|r| r.objective),
             history_constraint_violation: history(|r| r.violation),
             history_seconds: history(|r| r.seconds),
@@ -145,10 +140,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
         schema: PLAN_SCHEMA,
         warpgait_version: env!("CARGO_PKG_VERSION").into(),
         created: rfc3339(SystemTime::now()),
-        formulation: match scenario.formulation {
-            Formulation::Warped => "warped".into(),
-            Formulation::Direct => "direct".into(),
-        },
+        formulation: scenario.formulation,
         sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,
         scenario: provenance.text.into(),
         robot: meta_robot(model, provenance),

@@ -30,8 +30,10 @@ impl Plan {
         npz.add_bool("foot_adhesive", &[e], &self.foot_adhesive)?;
 
         if let Some(warped) = &self.warped {
-            npz.add_points("warped_base_position", &[n], &warped.base_position)?;
-            npz.add_points("warped_base_euler", &[n], &warped.base_euler)?;
+            if let Some(base) = &warped.base {
+                npz.add_points("warped_base_position", &[n], &base.position)?;
+                npz.add_points("warped_base_euler", &[n], &base.euler)?;
+            }
             npz.add_points("warped_foot_position", &[n, e], &warped.foot_position)?;
             npz.add_points("warped_foot_force", &[n, e], &warped.foot_force)?;
         }
@@ -115,12 +117,10 @@ impl Plan {
         ensure("foot_adhesive", self.foot_adhesive.len() == e, [])?;
         ensure("phase_durations", self.phase_durations.len() == e, self.phase_durations.iter().flatten())?;
         if let Some(warped) = &self.warped {
-            ensure(
-                "warped_base_position",
-                warped.base_position.len() == n,
-                warped.base_position.iter().flatten(),
-            )?;
-            ensure("warped_base_euler", warped.base_euler.len() == n, warped.base_euler.iter().flatten())?;
+            if let Some(base) = &warped.base {
+                ensure("warped_base_position", base.position.len() == n, base.position.iter().flatten())?;
+                ensure("warped_base_euler", base.euler.len() == n, base.euler.iter().flatten())?;
+            }
             ensure(
                 "warped_foot_position",
                 warped.foot_position.len() == n * e,

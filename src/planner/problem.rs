@@ -233,7 +233,7 @@ fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     lower[..6].copy_from_slice(&initial[..6]);
     upper[..6].copy_from_slice(&initial[..6]);
     for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
-        if model.space.is_warped() {
+        if model.spaces.feet.is_warped() {
             for c in 0..SWING_CONTROL_POINTS {
                 lower[swing.control_points + 3 * c + 2] = 0.0;
             }

@@ -16,8 +16,7 @@ use crate::ipopt::{self, IterationRecord, Status};
 use crate::nlp::Model;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
-use crate::trajectory::Gait;
-use crate::trajectory::space::Space;
+use crate::trajectory::{Gait, Spaces};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
@@ -37,21 +36,16 @@ pub struct Task<'a> {
     pub gait: &'a Gait,
     /// Its ground.
     pub ground: &'a Arc<Heightfield>,
-    /// The map over that ground, for the warped formulation.
+    /// The map over that ground, for all formulations but the direct one.
     pub map: Option<&'a WarpMap>,
 }
 
 impl Task<'_> {
     /// The model over the whole terrain.
     fn model(&self) -> Result<Model> {
-        let space = match (self.scenario.formulation, self.map) {
-            (Formulation::Direct, _) => Space::Direct,
-            (Formulation::Warped, Some(map)) => Space::Warped(Box::new(map.clone())),
-            (Formulation::Warped, None) => {
-                return Err(Error::Internal("the warped formulation needs a map".into()));
-            }
-        };
-        Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), space)
+        let map = self.map.map(|map| Arc::new(map.clone()));
+        let spaces = Spaces::of(self.scenario.formulation, map)?;
+        Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), spaces)
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -217,14 +211,15 @@ impl<'a> Solve<'a> {
         }
         let Task { scenario, robot, gait, ground, .. } = *self.task;
         let ground = Arc::new(scaled(ground, stage.height_fraction())?);
-        let space = match scenario.formulation {
-            Formulation::Direct => Space::Direct,
-            Formulation::Warped => match self.host.build_map(&ground)? {
-                Some(map) => Space::Warped(Box::new(map)),
+        let map = match scenario.formulation {
+            Formulation::Direct => None,
+            Formulation::Warped | Formulation::Hybrid => match self.host.build_map(&ground)? {
+                Some(map) => Some(Arc::new(map)),
                 None => return Ok(None),
             },
         };
-        Model::new(scenario, robot, gait, ground, space).map(Some)
+        let spaces = Spaces::of(scenario.formulation, map)?;
+        Model::new(scenario, robot, gait, ground, spaces).map(Some)
     }
 
     /// Solves from x with at most `budget` iterations.

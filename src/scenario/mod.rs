@@ -13,6 +13,8 @@ pub(crate) use schema::closest as closest_word;
 pub use schema::json_schema;
 pub use template::template;
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +88,18 @@ pub enum Formulation {
     Warped,
     /// Eq. 1–5: variables in ambient space (the baseline).
     Direct,
+    /// The base in ambient space, feet and forces in F.
+    Hybrid,
+}
+
+impl fmt::Display for Formulation {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Warped => "warped",
+            Self::Direct => "direct",
+            Self::Hybrid => "hybrid",
+        })
+    }
 }
 
 /// `[robot]`.

@@ -33,7 +33,7 @@ pub fn solved(text: &str) -> (Motion, Plan) {
     let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
     let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
     let field = Arc::new(ground.field.clone());
-    let map = (scenario.formulation == Formulation::Warped)
+    let map = (scenario.formulation != Formulation::Direct)
         .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
     let gait = Gait::of(&scenario, &robot).expect("a gait");
     let task = Task { scenario: &scenario, robot: &robot, gait: &gait, ground: &field, map: map.as_ref() };
@@ -114,7 +114,7 @@ pub fn standing() -> Plan {
             schema: 1,
             warpgait_version: "0.1.0".into(),
             created: "2024-01-01T00:00:00Z".into(),
-            formulation: "direct".into(),
+            formulation: Formulation::Direct,
             sample_rate_hz: 200.0,
             scenario: SCENARIO.into(),
             robot: MetaRobot {
