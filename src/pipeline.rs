@@ -1,14 +1,11 @@
 //! From a scenario to a checked plan: terrain → map → NLP → plan → check. What `warpgait solve` and Python's
 //! `warpgait.solve` both do.
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use sha2::{Digest, Sha256};
-
+use crate::Result;
 use crate::check::{CheckReport, check};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
@@ -17,11 +14,9 @@ use crate::nlp::model::gait;
 use crate::nlp::solve::{self as nlp, Motion};
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
-use crate::robot::Robot;
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
-use crate::terrain::{self, Ground, GroundReport};
+use crate::terrain::{self, GroundReport};
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
-use crate::{Error, Result};
 
 /// So many variables are moved in a check of the derivatives.
 const DERIVATIVE_VARIABLES: usize = 200;
@@ -78,20 +73,18 @@ pub fn run(
     observer: &mut Observer,
 ) -> Result<Option<Outcome>> {
     let scenario = &loaded.scenario;
-    let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
-    phases_match(loaded, &robot)?;
-    nlp::validate(scenario)?;
+    let robot = &loaded.robot;
     // Refused now and not after the map.
-    gait(scenario, &robot)?;
+    gait(scenario, robot).map_err(|e| loaded.locate(e))?;
 
     // Whoever wishes to stop is asked again at the first iteration.
     let _ = observer(&Event::Stage("terrain"));
-    let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
+    let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     loaded.ensure_inside(ground.field.extent())?;
     for note in &ground.report.notes {
         let _ = observer(&Event::Note(&format!("terrain: {note}")));
     }
-    let inputs = inputs(loaded, &mut ground)?;
+    let inputs = ground.inputs.drain(..).chain(loaded.inputs.iter().cloned()).collect();
 
     let start = Instant::now();
     let map = match scenario.formulation {
@@ -112,16 +105,16 @@ pub fn run(
     let derivatives = match check_derivatives {
         true => {
             let _ = observer(&Event::Stage("derivatives"));
-            let mut problem = nlp::problem(scenario, &robot, &field, warp)?;
+            let mut problem = nlp::problem(scenario, robot, &field, warp)?;
             Some(compare_derivatives(&mut problem))
         }
         false => None,
     };
     let motion =
-        nlp::solve(scenario, &robot, &field, warp, &mut |at| observer(&Event::Iteration(at.clone())))?;
+        nlp::solve(scenario, robot, &field, warp, &mut |at| observer(&Event::Iteration(at.clone())))?;
     let _ = observer(&Event::Stage("plan"));
-    let text = &loaded.text;
-    let provenance = Provenance { scenario, text, robot: &robot, ground: &ground, inputs, map_seconds };
+    let text = &loaded.effective_text;
+    let provenance = Provenance { scenario, text, robot, ground: &ground, inputs, map_seconds };
     let mut plan = Plan::from_motion(&motion, &provenance);
     let check = check(&plan)?;
     plan.meta.checks = check.rows.clone();
@@ -158,36 +151,6 @@ impl Built {
             let _ = observer(&Event::Note(&format!("map: {warning}")));
         }
     }
-}
-
-fn phases_match(loaded: &LoadedScenario, robot: &Robot) -> Result<()> {
-    match &loaded.scenario.gait.phases {
-        Some(rows) if rows.len() != robot.feet.len() => {
-            let names: Vec<&str> = robot.feet.iter().map(|foot| foot.name.as_str()).collect();
-            let what = format!("given {} rows, allowed: one by foot, for {}", rows.len(), names.join(", "));
-            Err(loaded.error("gait.phases", what))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// SHA-256 of every file that goes in.
-fn inputs(loaded: &LoadedScenario, ground: &mut Ground) -> Result<BTreeMap<String, String>> {
-    let mut inputs: BTreeMap<String, String> = ground.inputs.drain(..).collect();
-    let robot = loaded.scenario.robot.file.as_ref().map(|file| (file.clone(), loaded.base_dir.join(file)));
-    let scenario = loaded
-        .path
-        .as_ref()
-        .and_then(|path| path.file_name().map(|name| (name.to_string_lossy().into_owned(), path.clone())));
-    for (name, path) in robot.into_iter().chain(scenario) {
-        inputs.insert(name, sha256(&path)?);
-    }
-    Ok(inputs)
-}
-
-fn sha256(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    Ok(Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// At the guess, in directions spread over all variables.

@@ -16,7 +16,6 @@ use crate::nlp::solve as nlp;
 use crate::plan::sampled::Provenance;
 use crate::plan::{CheckRow, Plan, Seconds};
 use crate::replay::{Tracked, Verdict};
-use crate::robot::Robot;
 use crate::scenario::{self, Formulation};
 use crate::terrain;
 use crate::warp::{self, MapReport, Order, WarpMap};
@@ -161,8 +160,7 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
     let mut cpu = Cpu { clock: clock.kind(), ..Cpu::default() };
     let loaded = scenario::load(scenario, &[])?;
     let asked = &loaded.scenario;
-    let robot = Robot::load(&asked.robot, &loaded.base_dir)?;
-    let ground = terrain::build(&asked.terrain, &loaded.base_dir)?;
+    let ground = terrain::build(&asked.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     loaded.ensure_inside(ground.field.extent())?;
     cpu.terrain = clock.lap();
 
@@ -193,7 +191,7 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
 
     let mut stages: Vec<(bool, f64)> = Vec::new();
     let mut continuation = false;
-    let motion = nlp::solve(asked, &robot, &field, warp, &mut |at| {
+    let motion = nlp::solve(asked, &loaded.robot, &field, warp, &mut |at| {
         continuation |= at.stage != "solve";
         // The steps of a continuation before its last one are on gentler ground.
         let whole = at.stage == "solve" || at.stage.ends_with(" 100 %");
@@ -203,8 +201,8 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
     cpu.solve = clock.lap();
     let provenance = Provenance {
         scenario: asked,
-        text: &loaded.text,
-        robot: &robot,
+        text: &loaded.effective_text,
+        robot: &loaded.robot,
         ground: &ground,
         inputs: BTreeMap::new(),
         map_seconds,
@@ -224,7 +222,7 @@ pub fn run(work: Work, scenario: &Path, plan: &Path) -> Result<Measured> {
     let tolerance = asked.solver.tolerance;
     let worst = motion.violations.iter().max_by(|a, b| a.largest.total_cmp(&b.largest));
     let evaluation = match work {
-        Work::Speed => Some(evaluation(&mut nlp::problem(asked, &robot, &field, warp)?)),
+        Work::Speed => Some(evaluation(&mut nlp::problem(asked, &loaded.robot, &field, warp)?)),
         _ => None,
     };
     let motion = MotionMeasured {
