@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::Result;
 use crate::heightfield::Heightfield;
 use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
@@ -11,7 +12,6 @@ use crate::scenario::Scenario;
 use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Layout};
-use crate::{Error, Result};
 
 /// m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -72,13 +72,6 @@ impl Model {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         let gait = gait(scenario, robot)?;
         let adhesive_feet = &scenario.robot.adhesive_feet;
-        if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
-            return Err(Error::input(format!(
-                "robot.adhesive_feet: \"{unknown}\" is no foot of {}; its feet are {}",
-                robot.name,
-                foot_names.join(", ")
-            )));
-        }
         let inertia = Matrix3::from_fn(|r, c| robot.inertia[r][c]);
         let along = |i: usize, count: usize| 2.0 * i as f64 / (count - 1) as f64 - 1.0;
         let (center, half) = (robot.torso.center, robot.torso.half_size);

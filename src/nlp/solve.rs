@@ -12,7 +12,7 @@ use crate::heightfield::Heightfield;
 use crate::ipopt::{self, IterationRecord, NlpProblem, Options, Status};
 use crate::plan::Seconds;
 use crate::robot::Robot;
-use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Law, Scenario};
+use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
 use crate::trajectory::space::Space;
 use crate::warp::{self, WarpMap};
 use crate::{Error, Result};
@@ -74,16 +74,6 @@ impl Motion {
     }
 }
 
-/// Refuses what cannot be solved before anything is computed.
-pub fn validate(scenario: &Scenario) -> Result<()> {
-    if scenario.physics.law == Law::NewtonEuler && scenario.formulation == Formulation::Warped {
-        return Err(Error::input(
-            "physics.law = \"newton-euler\" needs the orientation's second derivative in time, and the map is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default), or formulation = \"direct\"",
-        ));
-    }
-    Ok(())
-}
-
 /// Composes the NLP of a scenario at its guess, for checks of its derivatives.
 pub fn problem(
     scenario: &Scenario,
@@ -91,7 +81,6 @@ pub fn problem(
     ground: &Arc<Heightfield>,
     map: Option<&WarpMap>,
 ) -> Result<Problem> {
-    validate(scenario)?;
     let model = Model::new(scenario, robot, ground.clone(), space(scenario, map)?)?;
     let x = guess::guess(scenario, &model)?;
     Ok(Problem::new(scenario, model, x, Choice { with_costs: true, exact_hessian: true }))
@@ -116,7 +105,6 @@ pub fn solve(
     map: Option<&WarpMap>,
     on_progress: &mut OnProgress,
 ) -> Result<Motion> {
-    validate(scenario)?;
     let steps = match scenario.solver.continuation {
         Continuation::Mode(ContinuationMode::Off) => 0,
         Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
