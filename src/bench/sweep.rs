@@ -13,12 +13,12 @@ use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::Options;
 use super::case::{Measured, Work};
 use super::clock::processor_seconds_of;
 use super::protocol::Case;
+use crate::digest::sha256_hex;
 use crate::ipopt::INTERRUPT;
 use crate::plan::npz::write_atomically;
 use crate::replay::Tracked;
@@ -131,7 +131,7 @@ struct Place {
 impl Place {
     fn new(out: &Path) -> Result<Self> {
         let program = std::env::current_exe().map_err(|e| Error::io("the program itself", e))?;
-        let digest = hex(&std::fs::read(&program).map_err(|e| Error::io(&program, e))?);
+        let digest = sha256_hex(std::fs::read(&program).map_err(|e| Error::io(&program, e))?);
         let place = Self {
             cases: out.join("cases"),
             plans: out.join("plans"),
@@ -267,11 +267,7 @@ fn reason(status: &str, log: &str) -> String {
 
 /// What the result of a case depends on besides the program.
 fn key(case: &Case) -> String {
-    hex(format!("{}\n{}", case.work.name(), case.scenario).as_bytes())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    sha256_hex(format!("{}\n{}", case.work.name(), case.scenario))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::{MapProgress, MapReport, WarpMap, build};
+use crate::digest::{hex, sha256_hex};
 use crate::heightfield::Heightfield;
 use crate::scenario::MapSpec;
 use crate::{Error, Result};
@@ -76,17 +77,13 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
     hex(&hash.finalize())
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
-}
-
 /// The map in a cache file; none if there is no such file or it is not whole.
 fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, MapReport)> {
     let bytes = std::fs::read(path).ok()?;
     let end = bytes.iter().position(|b| *b == b'\n')?;
     let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
     let payload = &bytes[end + 1..];
-    if hex(&Sha256::digest(payload)) != header.checksum {
+    if sha256_hex(payload) != header.checksum {
         return None;
     }
     // The grid may be finer than the specification says, where it does not say.
@@ -106,7 +103,7 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
 /// Written aside and then renamed, so that no reader ever sees half a file.
 fn write(path: &Path, map: &WarpMap, report: &MapReport) -> Result<()> {
     let payload: Vec<u8> = map.control_points().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
-    let header = Header { checksum: hex(&Sha256::digest(&payload)), report: report.clone() };
+    let header = Header { checksum: sha256_hex(&payload), report: report.clone() };
     let header = serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory).map_err(|e| Error::io(directory, e))?;
