@@ -324,6 +324,10 @@ fn arrays_keep_slopes_fill_nan_and_crop() {
     for (a, b) in cropped.report.extent.into_iter().zip([-0.5, 0.33, -0.2, 0.41]) {
         assert!((a - b).abs() < 1e-12);
     }
+    // Of the 7 x 5 cells without data, those with x from -0.2 to 0.04 and y from 0.24 to 0.4.
+    assert_eq!(cropped.report.holes_filled, 35);
+    let beside = ground(&format!("{text}extent = [0.0, 0.6, -0.6, 0.3]"), folder.path());
+    assert_eq!(beside.report.holes_filled, 2 * 2);
     for (x, y) in [(-0.5, -0.2), (0.33, 0.41), (0.1, 0.1)] {
         assert!((cropped.field.height(x, y) - whole.field.height(x, y)).abs() < 1e-6);
     }

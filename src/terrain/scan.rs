@@ -12,10 +12,10 @@ use crate::scenario::terrain::HeightmapSpec;
 const FINE_SPACING: f64 = 0.02;
 /// Larger differences of height are taken for a wrong `height_scale`, m.
 const LARGEST_RELIEF: f64 = 1000.0;
-/// `terrain.extent` may exceed the file by this, m: a rounding error of the user's.
+/// `terrain.extent` may exceed the file by this, m, because users round.
 const EXTENT_SLACK: f64 = 1e-4;
 
-/// Heights at the nodes of a grid, row 0 at the least y; NaN where there is no data.
+/// Heights at the nodes of a grid, row 0 at the least y; NaN for no data.
 pub struct Scan {
     /// Where the nodes are; the same spacing along x and y.
     pub grid: Grid,
@@ -36,7 +36,7 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Gr
     let smoothing = spec.smoothing();
 
     let mut filled = measured.clone();
-    let holes_filled = fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;
+    fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;
     let (low, high) = range(&filled);
     if high - low > LARGEST_RELIEF {
         return Err(refuse(&format!(
@@ -63,47 +63,49 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Gr
     })?;
 
     let mut error = FitError::default();
-    for (i, h) in measured.iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+    let (mut cells, mut holes_filled) = (0, 0);
+    for (i, h) in measured.iter().enumerate() {
         let (x, y) = (grid.x(i % grid.columns), grid.y(i / grid.columns));
         if (extent[0]..=extent[1]).contains(&x) && (extent[2]..=extent[3]).contains(&y) {
-            error.add(x, y, field.height(x, y) - h);
+            cells += 1;
+            match h.is_nan() {
+                true => holes_filled += 1,
+                false => error.add(x, y, field.height(x, y) - h),
+            }
         }
     }
     let mut report = GroundReport::of(kind, &field, &error);
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
-    report.notes = notes(spec, &grid, holes_filled, smoothing, &report);
+    report.notes = notes(spec, &grid, cells, &report);
     Ok(Ground { field, raw: Some(raw), report, inputs: Vec::new() })
 }
 
-fn notes(
-    spec: &HeightmapSpec,
-    grid: &Grid,
-    holes: usize,
-    smoothing: f64,
-    report: &GroundReport,
-) -> Vec<String> {
+/// What a user should know about a scan, of whose grid `cells` lie within the extent.
+fn notes(spec: &HeightmapSpec, grid: &Grid, cells: usize, report: &GroundReport) -> Vec<String> {
     let mut notes = Vec::new();
     if spec.smoothing.is_none() {
         notes.push(format!(
-            "smoothed over {smoothing:.3} m by default (the larger of {} cells and {} m; terrain.smoothing sets it); \
+            "smoothed over {:.3} m by default (the larger of {} cells and {} m; terrain.smoothing sets it); \
              heights moved by {:.4} m rms, {:.4} m at most",
+            report.smoothing,
             HeightmapSpec::SMOOTHING_CELLS,
             HeightmapSpec::SMOOTHING_LENGTH,
             report.fit_error_rms,
             report.fit_error_max
         ));
     }
+    let holes = report.holes_filled;
     if holes > 0 {
         notes.push(format!(
-            "{holes} of {} cells have no data and were filled from their surroundings ({:.1} %)",
-            grid.len(),
-            100.0 * holes as f64 / grid.len() as f64
+            "{holes} of {cells} cells have no data and were filled from their surroundings ({:.1} %)",
+            100.0 * holes as f64 / cells as f64
         ));
     }
     if report.grid != [grid.columns, grid.rows] {
+        let cropped = if spec.extent.is_some() { "cropped and " } else { "" };
         notes.push(format!(
-            "{} x {} cells of {:.4} m became {} x {} of {:.4} m by the spline",
+            "{} x {} cells of {:.4} m were {cropped}interpolated to {} x {} of {:.4} m",
             grid.columns, grid.rows, grid.spacing[0], report.grid[0], report.grid[1], report.spacing[0]
         ));
     }
