@@ -4,15 +4,14 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use png::{BitDepth, ColorType};
-use warpgait::scenario::TerrainSpec;
+use warpgait::scenario;
 use warpgait::terrain::{Ground, build};
 
-fn spec(text: &str) -> TerrainSpec {
-    toml::from_str(text).unwrap()
-}
-
+/// The ground of a scenario whose `[terrain]` has these lines.
 fn ground(text: &str, folder: &Path) -> Ground {
-    build(&spec(text), folder).unwrap_or_else(|e| panic!("{text}: {e}"))
+    let whole = format!("[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n");
+    let loaded = scenario::load_text("s.toml", &whole, folder, &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
+    build(&loaded.scenario.terrain, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
 /// A PNG file; `palette` and `transparency` are the PLTE and tRNS chunks.
