@@ -8,7 +8,7 @@
 //!
 //! with ZYX Euler angles (roll φ, pitch θ, yaw ψ). It asks for second derivatives of position and orientation in time, and in F
 //! those of 𝒫(J) are third derivatives of φ, which jump from cell to cell: so it serves the direct formulation only
-//! ([`crate::nlp::solve::validate`] says so). Forces and p̈ are both linear between samples there: Newton's law that holds
+//! (loading a scenario refuses the combination). Forces and p̈ are both linear between samples there: Newton's law that holds
 //! at the samples holds everywhere.
 //!
 //! The rate of the angular momentum depends on nine numbers; dual numbers give its derivatives.
