@@ -87,6 +87,7 @@ pub mod digest;
 pub mod error;
 pub mod files;
 pub mod heightfield;
+pub mod input;
 pub mod ipopt;
 pub mod leg;
 pub mod nlp;

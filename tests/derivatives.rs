@@ -47,7 +47,7 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let map = bent(&WarpMap::shear(&field, &scenario.map).expect("a map"));
     let spaces = Spaces::of(scenario.formulation, Some(Arc::new(map))).expect("spaces");
     let gait = Gait::of(&scenario, &robot).expect("a gait");
-    let model = Model::new(&scenario, &robot, &gait, field, spaces).expect("a model");
+    let model = Model::new(&scenario, &robot, &gait, field, spaces);
     let x = guess::guess(&scenario, &model).expect("a guess");
     GaitProblem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::scenario::closest_word;
+use crate::input::closest;
 use crate::{Error, Result};
 
 /// One law.
@@ -93,8 +93,7 @@ impl CheckLimits {
         for (name, value) in table {
             let names: Vec<&str> = LAWS.iter().map(|law| law.name).collect();
             if !names.contains(&name.as_str()) {
-                let guess =
-                    closest_word(&name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let guess = closest(&name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let what = format!("no such law; {guess}allowed: {}", names.join(", "));
                 return Err(Error::input(format!("{file}: {name}: {what}")));
             }

@@ -10,7 +10,6 @@ use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
 use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::{Gait, Layout, Spaces};
-use crate::{Error, Result};
 
 /// m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -61,16 +60,9 @@ impl Model {
         gait: &Gait,
         ground: Arc<Heightfield>,
         spaces: Spaces,
-    ) -> Result<Self> {
+    ) -> Self {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         let adhesive_feet = &scenario.robot.adhesive_feet;
-        if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
-            return Err(Error::input(format!(
-                "robot.adhesive_feet: \"{unknown}\" is no foot of {}; its feet are {}",
-                robot.name,
-                foot_names.join(", ")
-            )));
-        }
         let inertia = Matrix3::from_fn(|r, c| robot.inertia[r][c]);
         let along = |i: usize, count: usize| 2.0 * i as f64 / (count - 1) as f64 - 1.0;
         let (center, half) = (robot.torso.center, robot.torso.half_size);
@@ -85,7 +77,7 @@ impl Model {
                 })
             })
             .collect();
-        Ok(Self {
+        Self {
             mass: robot.mass,
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
@@ -105,7 +97,7 @@ impl Model {
                     force: scenario.discretization.force_knots,
                 },
             ),
-        })
+        }
     }
 
     /// Number of feet.

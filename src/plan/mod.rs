@@ -122,6 +122,12 @@ pub struct Meta {
     pub sample_rate_hz: f64,
     /// The whole scenario, overrides included, as TOML.
     pub scenario: String,
+    /// The scenario as the user wrote it; empty in plans of version 0.1.0 and before.
+    #[serde(default)]
+    pub scenario_source: String,
+    /// Values set from the command line or from Python, each `key=value`.
+    #[serde(default)]
+    pub overrides: Vec<String>,
     /// The robot as planned with.
     pub robot: MetaRobot,
     /// The limits as planned with; missing in plans of version 0.1.0 and before.

@@ -1,6 +1,5 @@
 //! A plan from a motion: everything at ten times the sample rate of the NLP, in ambient space.
 
-use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
@@ -12,8 +11,7 @@ use crate::ipopt::IterationRecord;
 use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
-use crate::robot::Robot;
-use crate::scenario::Scenario;
+use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::Ground;
 use crate::trajectory::layout::{FootVariables, Layout};
 use crate::trajectory::sampling;
@@ -24,16 +22,10 @@ pub const SAMPLES_A_STEP: usize = 10;
 
 /// What a plan carries besides the motion.
 pub struct Provenance<'a> {
-    /// The scenario.
-    pub scenario: &'a Scenario,
-    /// The scenario's text.
-    pub text: &'a str,
-    /// The robot.
-    pub robot: &'a Robot,
+    /// The scenario with its robot and its files.
+    pub loaded: &'a LoadedScenario,
     /// The ground.
     pub ground: &'a Ground,
-    /// Input files by name, with their SHA-256.
-    pub inputs: BTreeMap<String, String>,
     /// Time spent on the map, s.
     pub map_seconds: f64,
 }
@@ -135,15 +127,18 @@ fn ground_grid(ground: &Ground) -> GroundGrid {
 }
 
 fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
-    let (model, scenario) = (&motion.model, provenance.scenario);
+    let (model, loaded) = (&motion.model, provenance.loaded);
+    let scenario = &loaded.scenario;
     Meta {
         schema: PLAN_SCHEMA,
         warpgait_version: env!("CARGO_PKG_VERSION").into(),
         created: rfc3339(SystemTime::now()),
         formulation: scenario.formulation,
         sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,
-        scenario: provenance.text.into(),
-        robot: meta_robot(model, provenance),
+        scenario: loaded.effective_text.clone(),
+        scenario_source: loaded.source_text.clone(),
+        overrides: loaded.overrides.clone(),
+        robot: meta_robot(model, loaded),
         limits: Some(limits(scenario)),
         solver: MetaSolver {
             status: motion.status.clone(),
@@ -157,17 +152,17 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
             },
         },
         checks: vec![],
-        inputs: provenance.inputs.clone(),
+        inputs: loaded.inputs.iter().chain(&provenance.ground.inputs).cloned().collect(),
     }
 }
 
-fn meta_robot(model: &Model, provenance: &Provenance) -> MetaRobot {
-    let robot = provenance.robot;
+fn meta_robot(model: &Model, loaded: &LoadedScenario) -> MetaRobot {
+    let robot = &loaded.robot;
     MetaRobot {
         name: robot.name.clone(),
         mass: robot.mass,
         inertia: robot.inertia,
-        friction: provenance.scenario.contact.friction,
+        friction: loaded.scenario.contact.friction,
         gravity: [0.0, 0.0, -GRAVITY],
         reach: model.reach.clone(),
         torso: robot.torso,

@@ -45,7 +45,7 @@ impl Task<'_> {
     fn model(&self) -> Result<Model> {
         let map = self.map.map(|map| Arc::new(map.clone()));
         let spaces = Spaces::of(self.scenario.formulation, map)?;
-        Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), spaces)
+        Ok(Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), spaces))
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -219,7 +219,7 @@ impl<'a> Solve<'a> {
             },
         };
         let spaces = Spaces::of(scenario.formulation, map)?;
-        Model::new(scenario, robot, gait, ground, spaces).map(Some)
+        Ok(Some(Model::new(scenario, robot, gait, ground, spaces)))
     }
 
     /// Solves from x with at most `budget` iterations.
