@@ -41,6 +41,7 @@
 //!
 //! | module | takes | gives |
 //! | --- | --- | --- |
+//! | [`input`] | TOML files | their values with the line of every key |
 //! | [`scenario`], [`robot`] | TOML files | plain data, or an error that names line, key and what is allowed |
 //! | [`terrain`] | `[terrain]`, images, arrays | heights on a grid: holes filled, smoothed, with the error of the fit |
 //! | [`heightfield`] | heights | h as a C² spline with derivatives |
@@ -58,6 +59,7 @@
 //! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
 //! | [`replay`] | a report of the Python package | its verdict |
 //! | [`cli`] | arguments | exit codes |
+//! | [`files`], [`digest`] | | files written whole or not at all, `.npz` archives, SHA-256 |
 //!
 //! # Notation
 //!

@@ -1,8 +1,6 @@
 //! The check: a good plan passes every law; a plan that breaks one law fails that one and no other.
 
-mod common;
-
-use common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
+use crate::common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
 use warpgait::check::{CheckLimits, LAWS, check, check_with};
 use warpgait::plan::Plan;
 

@@ -1,11 +1,9 @@
 //! Optimized phase durations: motions are solved and hold like others, their phases differ from the nominal ones and keep to
 //! their bounds, and they cost less.
 
-mod common;
-
 use std::path::Path;
 
-use common::solved;
+use crate::common::solved;
 use warpgait::check::check;
 use warpgait::pipeline;
 use warpgait::plan::Plan;

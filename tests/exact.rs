@@ -1,10 +1,9 @@
 //! The exact motion of a plan goes through its samples, between them it is what its derivatives say, and splines that do
 //! not fit together are refused.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common;
 use warpgait::pipeline;
 use warpgait::plan::Plan;
 use warpgait::scenario::load_text;

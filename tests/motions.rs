@@ -1,11 +1,9 @@
 //! Whole motions: solved, checked by the code that reads plans alone, and as a person would expect them. Short horizons, so
 //! that all of them run in every build; their residuals are recorded in `tests/residuals.csv`.
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::solved;
+use crate::common::solved;
 use warpgait::check::{CheckReport, check};
 use warpgait::plan::Plan;
 use warpgait::planner::Motion;

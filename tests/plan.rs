@@ -1,10 +1,9 @@
 //! The plan file: what is written is what is read, and what is broken is refused by name.
 
-mod common;
-
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use crate::common;
 use warpgait::files::npz::NpzWriter;
 use warpgait::plan::{Plan, WarpedBase, WarpedSamples};
 use warpgait::warp::MapGrid;

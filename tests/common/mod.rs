@@ -1,5 +1,4 @@
 //! Motions and hand-made plans for the tests.
-#![allow(dead_code, reason = "each test crate uses its own part")]
 
 use std::ops::ControlFlow;
 

@@ -97,7 +97,7 @@ class Plan:
     foot_names: tuple[str, ...]  # E
     foot_adhesive: Bools  # (E,)
     terrain: Heightfield
-    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster or mesh
+    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster
     robot: PlannedRobot
     pull_limit: float  # largest pull of an adhesive foot, fraction of m g; 0 if no foot is adhesive
     solved: bool  # every constraint of the NLP holds
