@@ -6,7 +6,7 @@
 //!
 //! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` evaluates every sample.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::margins;
 use crate::heightfield::HeightJet;
@@ -14,9 +14,10 @@ use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::ground_normal::height_form;
 use crate::nlp::sink::Sink;
 use crate::nlp::state::BaseNode;
-use crate::nlp::tangent::Tangent;
+use crate::nlp::tangent::PoseTangent;
 use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
 /// Every how many samples there are rows.
@@ -70,11 +71,10 @@ impl Constraint for BaseClearance {
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, (k, b)) in self.places.iter().enumerate() {
-            let (base, node) = (&state.base[*k], &model.layout.base[*k]);
-            let (arm, _, _, by_q) = point(model, base, b);
+            let (arm, _, _, by_q) = point(model, &state.base[*k], b);
             // dq = dp + δ × R b.
-            Tangent::base(model, base, node).add_along(&by_q, &mut sink.row(first + r));
-            Tangent::turn(model, base, node).add_along(&arm.cross(&by_q), &mut sink.row(first + r));
+            let pose = PoseTangent::new(model, state, Instant::Sample(*k));
+            pose.add_along(&arm.cross(&by_q), &by_q, &mut sink.row(first + r));
         }
     }
 
@@ -84,30 +84,18 @@ impl Constraint for BaseClearance {
         state: &State,
         multipliers: &[f64],
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
-        let mut multipliers = multipliers.iter();
-        for points in self.places.chunk_by(|a, b| a.0 == b.0) {
-            let k = points[0].0;
-            let (base, node) = (&state.base[k], &model.layout.base[k]);
-            // All points of a sample depend on the same pose, so their forms are summed before they are scattered.
-            let [mut moves, mut both, mut turns] = [Matrix3::zeros(); 3];
-            for ((_, b), &lambda) in points.iter().zip(&mut multipliers) {
-                let (arm, ground, _, by_q) = point(model, base, b);
-                curvature.base_position[k] += by_q * lambda;
-                curvature.base_rotation[k] += by_q * b.transpose() * lambda;
-                let form = height_form(&ground) * -lambda;
-                // dq = dp − [R b] δ.
-                let by_turn = -cross_matrix(&arm);
-                moves += form;
-                both += form * by_turn;
-                turns += by_turn.transpose() * form * by_turn;
-            }
-            let position = Tangent::base(model, base, node);
-            let turn = Tangent::turn(model, base, node);
-            position.quadratic(&moves, sink);
-            position.cross(&both, &turn, sink);
-            turn.quadratic(&turns, sink);
+        for (&lambda, (k, b)) in multipliers.iter().zip(&self.places) {
+            let (arm, ground, _, by_q) = point(model, &state.base[*k], b);
+            curvature.base_position[*k] += by_q * lambda;
+            curvature.base_rotation[*k] += by_q * b.transpose() * lambda;
+            // dq = dp − [R b] δ.
+            let (by_turn, q) = (-cross_matrix(&arm), height_form(&ground) * -lambda);
+            let form = &mut curvature.forms.base[*k];
+            form.turn += by_turn.transpose() * q * by_turn;
+            form.turn_base += by_turn.transpose() * q;
+            form.base += q;
         }
     }
 

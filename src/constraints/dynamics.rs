@@ -253,27 +253,18 @@ impl Constraint for Dynamics {
         }
         for l in 0..self.stencils.len() {
             let (by_force, by_torque) = self.wrench_multipliers(multipliers, l);
-            let base = &state.base[l];
-            let base_position = Tangent::base(model, base, &layout.base[l]);
-            let form = -cross_matrix(&by_torque);
+            let cross = cross_matrix(&by_torque);
             for i in 0..model.feet() {
-                let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
-                let contact = &state.contacts[i][j];
-                let (f, arm) = (state.forces[i][l], contact.point.position - base.position());
-                // λ · (r × f): ∂/∂r = f × λ, ∂/∂f = λ × r, ∂²/∂r∂f = −[λ].
-                let by_arm = f.cross(&by_torque);
+                let Some((j, _)) = state.force_node(model, i, l) else { continue };
+                let arm = state.contacts[i][j].point.position - state.base[l].position();
+                // λ · (r × f): ∂/∂r = f × λ, ∂/∂f = λ × r, ∂²/∂f∂r = [λ].
+                let by_arm = state.forces[i][l].cross(&by_torque);
                 curvature.contacts[i][j] += by_arm;
                 curvature.base_position[l] -= by_arm;
                 curvature.forces[i][l] += by_force + by_torque.cross(&arm);
-                let foothold = &layout.feet[i].stances[j].foothold;
-                let position = Tangent::foot(model, contact, foothold);
-                for force in [
-                    Tangent::force(model, contact, force_node),
-                    Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][l]),
-                ] {
-                    position.cross(&form, &force, sink);
-                    base_position.cross(&-form, &force, sink);
-                }
+                let form = &mut curvature.forms.forces[i][l];
+                form.foothold += cross;
+                form.base -= cross;
             }
         }
     }

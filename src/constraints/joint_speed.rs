@@ -109,15 +109,15 @@ impl Constraint for JointSpeed {
         state: &State,
         multipliers: &[f64],
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
         for (lambda, place) in multipliers.chunks_exact(2).zip(&self.places) {
             for after in 0..2 {
                 let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
                 let [thigh, knee] = jets(model, state, place, after);
                 let sum = thigh * (lambda[0] * scale) + knee * (lambda[1] * scale);
-                foot_in_base::add_quadratic(model, state, at, &sum.second, sink);
-                foot_in_base::add_curvature(model, state, at, &sum.first, curvature, sink);
+                foot_in_base::add_quadratic(model, state, at, &sum.second, curvature);
+                foot_in_base::add_curvature(model, state, at, &sum.first, curvature);
             }
         }
     }

@@ -125,7 +125,7 @@ impl Constraint for JointTorque {
         state: &State,
         multipliers: &[f64],
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
         for (lambda, &(at, leg)) in multipliers.chunks_exact(3).zip(&self.places) {
             let ForceSample { foot: i, sample: k, .. } = at;
@@ -135,32 +135,30 @@ impl Constraint for JointTorque {
             });
             // In r alone.
             let torque = sum[0] * local.x + sum[1] * local.y + sum[2] * local.z;
-            foot_in_base::add_quadratic(model, state, (i, k), &torque.second, sink);
-            foot_in_base::add_curvature(model, state, (i, k), &torque.first, curvature, sink);
-            // In Rᵀ f alone: λ · Rᵀ f.
+            foot_in_base::add_quadratic(model, state, (i, k), &torque.second, curvature);
+            foot_in_base::add_curvature(model, state, (i, k), &torque.first, curvature);
+            // In Rᵀ f alone: λ · Rᵀ f, with the mixed form (δ × Rλ) · df = dfᵀ [Rλ]ᵀ δ.
             let r = state.base[k].rotation();
             let lambda = values(&sum);
             let world = r * lambda;
-            let (turn, forces) = tangents(model, state, at);
             curvature.base_rotation[k] += f * lambda.transpose();
             curvature.forces[i][k] += world;
-            for force in &forces {
-                turn.cross(&cross_matrix(&world), force, sink);
-            }
-            // In both: (change of r)ᵀ B (change of Rᵀ f), with R (change of r) = [arm] δ + dp_i − dp.
+            // In both: (change of r)ᵀ B (change of Rᵀ f), with R (change of r) = [arm] δ + dp_i − dp and
+            // R (change of Rᵀ f) = [f] δ + df.
             let by_r = Matrix3::from_fn(|d, c| sum[c].first[d]);
-            let form = r * by_r * r.transpose();
+            let b = r * by_r * r.transpose();
             let at = (i, Instant::Sample(k));
             let arm = cross_matrix(&foot_in_base::arm(model, state, at));
-            let [_, base, foot] = foot_in_base::tangents(model, state, at);
-            for (by, tangent) in
-                [(arm.transpose(), turn), (-Matrix3::identity(), base), (Matrix3::identity(), foot)]
-            {
-                tangent.cross(&(by * form * cross_matrix(&f)), &turn, sink);
-                for force in &forces {
-                    tangent.cross(&(by * form), force, sink);
-                }
-            }
+            let cross = cross_matrix(&f);
+            let form = curvature.forms.foot_mut(i, at.1);
+            let turns = arm.transpose() * b * cross;
+            form.pose.turn += turns + turns.transpose();
+            form.pose.turn_base -= (b * cross).transpose();
+            form.turn_foot += (b * cross).transpose();
+            let form = &mut curvature.forms.forces[i][k];
+            form.turn += cross_matrix(&world).transpose() + b.transpose() * arm;
+            form.base -= b.transpose();
+            form.foot += b.transpose();
         }
     }
 

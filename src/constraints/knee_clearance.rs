@@ -18,7 +18,7 @@ use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::ground_normal::distance;
 use crate::nlp::sink::Sink;
-use crate::nlp::tangent::Tangent;
+use crate::nlp::tangent::{PoseTangent, Tangent};
 use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
@@ -94,11 +94,6 @@ impl KneeClearance {
         let r = foot_in_base::value(model, state, (*i, *at));
         points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *at), local))
     }
-
-    fn tangents<'a>(&self, model: &'a Model, state: &'a State, place: usize) -> [Tangent<'a>; 3] {
-        let (i, at, _) = self.places[place];
-        foot_in_base::tangents(model, state, (i, at))
-    }
 }
 
 impl Constraint for KneeClearance {
@@ -129,11 +124,13 @@ impl Constraint for KneeClearance {
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for place in 0..self.places.len() {
-            let [turn, base, foot] = self.tangents(model, state, place);
+            let (i, at, _) = self.places[place];
+            let pose = PoseTangent::new(model, state, at);
+            let foot = Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at));
             for (j, moved) in self.moved(model, state, place).iter().enumerate() {
                 let (row, by_q) = (first + 2 * place + j, moved.distance.1);
-                turn.add_along(&moved.by_turn.tr_mul(&by_q), &mut sink.row(row));
-                base.add_along(&moved.by_base().tr_mul(&by_q), &mut sink.row(row));
+                let (by_turn, by_base) = (moved.by_turn.tr_mul(&by_q), moved.by_base().tr_mul(&by_q));
+                pose.add_along(&by_turn, &by_base, &mut sink.row(row));
                 foot.add_along(&moved.with_foot.tr_mul(&by_q), &mut sink.row(row));
             }
         }
@@ -145,35 +142,33 @@ impl Constraint for KneeClearance {
         state: &State,
         multipliers: &[f64],
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
         for (place, lambda) in multipliers.chunks_exact(2).enumerate() {
             let (i, at, _) = self.places[place];
             let rotation = state.base_at(at).rotation();
-            let [turn, base, foot] = self.tangents(model, state, place);
             for (moved, lambda) in self.moved(model, state, place).iter().zip(lambda) {
                 // The ground's curvature, and the normal's.
-                let form = moved.distance.2 * *lambda;
+                let q = moved.distance.2 * *lambda;
                 let (by_turn, by_base, by_foot) = (moved.by_turn, moved.by_base(), moved.with_foot);
-                turn.quadratic(&(by_turn.transpose() * form * by_turn), sink);
-                base.quadratic(&(by_base.transpose() * form * by_base), sink);
-                foot.quadratic(&(by_foot.transpose() * form * by_foot), sink);
-                turn.cross(&(by_turn.transpose() * form * by_base), &base, sink);
-                turn.cross(&(by_turn.transpose() * form * by_foot), &foot, sink);
-                base.cross(&(by_base.transpose() * form * by_foot), &foot, sink);
                 // w · d²q for q = p + R v(r): w · d²p, w · d²R v, w · dR dv, w · R d²v.
                 let w = moved.distance.1 * *lambda;
                 let v = Vector3::from_fn(|c, _| moved.local[c].value);
                 curvature.add_base(at, &w, &(w * v.transpose()));
                 // (δ × R dv) · w = −δᵀ [w] (R dv), R dv = R ∂v/∂r Rᵀ ([arm] δ + dp_i − dp).
                 let mixed = -cross_matrix(&w) * moved.with_foot;
-                turn.cross(&(mixed * moved.arm), &turn, sink);
-                turn.cross(&mixed, &foot, sink);
-                turn.cross(&-mixed, &base, sink);
+                let turns = mixed * moved.arm;
+                let form = curvature.forms.foot_mut(i, at);
+                form.pose.turn += by_turn.transpose() * q * by_turn + turns + turns.transpose();
+                form.pose.turn_base += by_turn.transpose() * q * by_base - mixed;
+                form.pose.base += by_base.transpose() * q * by_base;
+                form.turn_foot += by_turn.transpose() * q * by_foot + mixed;
+                form.base_foot += by_base.transpose() * q * by_foot;
+                form.foot += by_foot.transpose() * q * by_foot;
                 let u = rotation.tr_mul(&w);
                 let sum = moved.local[0] * u.x + moved.local[1] * u.y + moved.local[2] * u.z;
-                foot_in_base::add_quadratic(model, state, (i, at), &sum.second, sink);
-                foot_in_base::add_curvature(model, state, (i, at), &sum.first, curvature, sink);
+                foot_in_base::add_quadratic(model, state, (i, at), &sum.second, curvature);
+                foot_in_base::add_curvature(model, state, (i, at), &sum.first, curvature);
             }
         }
     }

@@ -85,11 +85,11 @@ impl Constraint for Reach {
         state: &State,
         multipliers: &[f64],
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
         for (r, &place) in self.places.iter().enumerate() {
             let lambda = Vector3::from_column_slice(&multipliers[3 * r..3 * r + 3]);
-            foot_in_base::add_curvature(model, state, place, &lambda, curvature, sink);
+            foot_in_base::add_curvature(model, state, place, &lambda, curvature);
         }
     }
 

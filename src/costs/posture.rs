@@ -65,13 +65,13 @@ impl Cost for Posture {
         _x: &[f64],
         factor: f64,
         curvature: &mut NodeCurvature,
-        sink: &mut Sink,
+        _sink: &mut Sink,
     ) {
         let weight = factor * self.weight;
         for &(i, k) in &self.places {
             let error = foot_in_base::value(model, state, (i, k)) - model.nominal[i];
-            foot_in_base::add_curvature(model, state, (i, k), &(error * weight), curvature, sink);
-            foot_in_base::add_quadratic(model, state, (i, k), &(Matrix3::identity() * weight), sink);
+            foot_in_base::add_curvature(model, state, (i, k), &(error * weight), curvature);
+            foot_in_base::add_quadratic(model, state, (i, k), &(Matrix3::identity() * weight), curvature);
         }
     }
 }

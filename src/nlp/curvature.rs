@@ -1,11 +1,14 @@
 //! Second derivatives of the nodes themselves. Every term of the Lagrangian accumulates its derivatives with respect to the
-//! ambient quantities; once all have, the nodes' own second derivatives are added with these weights.
+//! ambient quantities, first ([`NodeCurvature`]) and second ([`LocalForms`]); once all have, these are pulled back to the variables, once
+//! for each node.
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::local_forms::LocalForms;
 use super::model::Model;
 use super::sink::Sink;
-use super::state::{BaseNode, FootNode, State};
+use super::state::{FootNode, State};
+use super::tangent::{PoseTangent, Tangent};
 use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::skew_part;
 use crate::trajectory::space::PointJet;
@@ -35,6 +38,8 @@ pub struct NodeCurvature {
     pub full_forces: Vec<Vec<Vector3<f64>>>,
     /// ∂L/∂f̄_i beyond what goes through f_i, `[foot][k]`.
     pub warped_forces: Vec<Vec<Vector3<f64>>>,
+    /// ∂²L/∂(ambient quantities)² at one instant each.
+    pub forms: LocalForms,
 }
 
 impl NodeCurvature {
@@ -55,6 +60,7 @@ impl NodeCurvature {
             forces: state.forces.clone(),
             full_forces: state.forces.clone(),
             warped_forces: state.forces.clone(),
+            forms: LocalForms::new(state),
         }
     }
 
@@ -76,6 +82,7 @@ impl NodeCurvature {
                 foot.fill(Vector3::zeros());
             }
         }
+        self.forms.clear();
     }
 
     /// Adds ∂L/∂p_i of a foot at an instant.
@@ -123,88 +130,150 @@ impl NodeCurvature {
         ] {
             to.iter_mut().zip(from).for_each(|(to, from)| sum(to, from));
         }
+        self.forms.merge(&other.forms);
     }
 
-    /// Adds part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
-    /// base, 1 the nodes that depend on switches, 2 the feet.
+    /// Adds part `part` of the Hessian, after all terms have accumulated their weights and forms: 0 the base, 1 the nodes that depend
+    /// on switches, 2 the feet and forces.
     pub fn scatter(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
         match part {
             0 => self.scatter_bases(model, state, sink),
             1 => self.scatter_switches(model, state, sink),
-            _ if model.spaces.feet.is_warped() => self.scatter_feet(model, state, sink),
-            _ => {}
+            _ => self.scatter_feet(model, state, sink),
         }
     }
 
     fn scatter_bases(&self, model: &Model, state: &State, sink: &mut Sink) {
-        let layout = &model.layout;
-        for (k, base) in state.base.iter().enumerate() {
-            scatter_base(model, base, &layout.base[k], &self.base_position[k], &self.base_rotation[k], sink);
+        for k in 0..state.base.len() {
+            let weights = (&self.base_position[k], &self.base_rotation[k]);
+            self.scatter_base(model, state, Instant::Sample(k), weights, sink);
         }
-        for (k, base) in state.base_between.iter().enumerate() {
+        for k in 0..state.base_between.len() {
             let (position, rotation) = &self.base_between[k];
-            scatter_base(model, base, &layout.base_between[k], position, rotation, sink);
+            self.scatter_base(model, state, Instant::Between(k), (position, rotation), sink);
         }
     }
 
-    /// The part of the feet and forces that is due to φ.
-    fn scatter_feet(&self, model: &Model, state: &State, sink: &mut Sink) {
-        let layout = &model.layout;
-        let position = |sink: &mut Sink, node: &LinearNode, point: &PointJet, weight: &Vector3<f64>| {
-            for d in 0..3 {
-                for e in 0..=d {
-                    sink.own(node, d, e, weight.dot(&point.first[e].column(d)));
+    /// Adds ∂L/∂p · ∂²p, ⟨∂L/∂R, ∂²R⟩ and the form in the pose.
+    fn scatter_base(
+        &self,
+        model: &Model,
+        state: &State,
+        instant: Instant,
+        (by_position, by_rotation): (&Vector3<f64>, &Matrix3<f64>),
+        sink: &mut Sink,
+    ) {
+        let base = state.base_at(instant);
+        let (pose, form) = (PoseTangent::new(model, state, instant), self.forms.pose(instant));
+        // ⟨Λ, ∂_d ∂_e R⟩ with Q = Λ Rᵀ: ∂_e w_d · skew(Q) + w_eᵀ Q w_d − (w_d · w_e) tr Q.
+        let q = by_rotation * base.rotation().transpose();
+        let (axis, trace) = (skew_part(&q), q.trace());
+        let w = &base.turn.first;
+        for d in 0..6 {
+            for e in 0..=d {
+                let mut value = base.turn.second[e][d].dot(&axis) + w[e].dot(&(q * w[d]))
+                    - w[d].dot(&w[e]) * trace
+                    + pose.second(&form, d, e);
+                if d < 3 {
+                    value += by_position.dot(&base.point.first[e].column(d));
                 }
-            }
-        };
-        for (i, foot) in layout.feet.iter().enumerate() {
-            for (j, stance) in foot.stances.iter().enumerate() {
-                let point = &state.contacts[i][j].point;
-                let foothold = &stance.foothold;
-                position(sink, foothold, point, &self.contacts[i][j]);
-                // f = J(c̄) f̄: ∂²f/∂c̄∂f̄ = ∂J, ∂²f/∂c̄² = ∂²J f̄, the latter summed over the stance's samples first.
-                let mut total = Matrix3::zeros();
-                let mut force =
-                    |sink: &mut Sink, node: &LinearNode, warped: &Vector3<f64>, weight: &Vector3<f64>| {
-                        for e in 0..3 {
-                            let row = point.first[e].transpose() * weight;
-                            for d in 0..3 {
-                                sink.pair((foothold, e), (node, d), row[d]);
-                                total[(e, d)] += weight.dot(&(point.second[e][d] * warped));
-                            }
-                        }
-                    };
-                for (k, full) in stance.free_forces() {
-                    let Some(timed) = &state.force_nodes[i][k] else { continue };
-                    let (mut weight, full_weight) = (self.forces[i][k], &self.full_forces[i][k]);
-                    if timed.is_timed() {
-                        force(sink, full, &state.warped_full_forces[i][k], full_weight);
-                    } else {
-                        weight += full_weight;
-                    }
-                    force(sink, &timed.node, &state.warped_forces[i][k], &weight);
-                }
-                for d in 0..3 {
-                    for e in 0..=d {
-                        sink.own(foothold, d, e, total[(e, d)]);
-                    }
-                }
-            }
-            for (k, timed) in state.foot_nodes[i].iter().enumerate() {
-                if let Phase::Swing(_) = layout.phase[i][k] {
-                    position(sink, &timed.node, &state.swings[i][k].point, &self.swings[i][k]);
-                }
-            }
-            for (k, timed) in state.foot_nodes_between[i].iter().enumerate() {
-                if let Phase::Swing(_) = layout.phase_at(i, Instant::Between(k)) {
-                    let point = &state.swings_between[i][k].point;
-                    position(sink, &timed.node, point, &self.swings_between[i][k]);
-                }
-            }
-            for (n, at) in state.swing_points[i].iter().enumerate() {
-                position(sink, &at.node, &state.points[i][n].point, &self.points[i][n]);
+                sink.own(pose.node, d, e, value);
             }
         }
+    }
+
+    fn scatter_feet(&self, model: &Model, state: &State, sink: &mut Sink) {
+        for i in 0..model.feet() {
+            for j in 0..model.layout.feet[i].stances.len() {
+                self.scatter_stance(model, state, i, j, sink);
+            }
+            for k in 0..state.base.len() {
+                self.scatter_swing(model, state, i, Instant::Sample(k), sink);
+            }
+            for k in 0..state.swings_between[i].len() {
+                self.scatter_swing(model, state, i, Instant::Between(k), sink);
+            }
+            for (n, at) in state.swing_points[i].iter().enumerate() {
+                let point = &state.points[i][n].point;
+                own(&at.node, &pulled_back(point, &self.points[i][n], &Matrix3::zeros()), sink);
+            }
+        }
+    }
+
+    /// What depends on a moving foot at an instant.
+    fn scatter_swing(&self, model: &Model, state: &State, i: usize, instant: Instant, sink: &mut Sink) {
+        if let Phase::Swing(_) = model.layout.phase_at(i, instant) {
+            let (foot, form) = (state.foot(model, i, instant), self.forms.foot(i, instant));
+            let weight = match instant {
+                Instant::Sample(k) => &self.swings[i][k],
+                Instant::Between(k) => &self.swings_between[i][k],
+            };
+            let node = state.foot_node(i, instant);
+            own(node, &pulled_back(&foot.point, weight, &form.foot), sink);
+            let pose = PoseTangent::new(model, state, instant);
+            pose.cross(&form.turn_foot, &form.base_foot, &Tangent::foot(model, foot, node), sink);
+        }
+    }
+
+    /// What depends on the foothold of a stance, and on the forces there.
+    fn scatter_stance(&self, model: &Model, state: &State, i: usize, j: usize, sink: &mut Sink) {
+        let (contact, stance) = (&state.contacts[i][j], &model.layout.feet[i].stances[j]);
+        let (foothold, tangent) = (&stance.foothold, Tangent::foot(model, contact, &stance.foothold));
+        let mut form = Matrix3::zeros();
+        let stands = |&instant: &Instant| model.layout.phase_at(i, instant) == Phase::Stance(j);
+        let samples = stance.stance.start.floor() as usize..=stance.stance.end.ceil() as usize;
+        let between =
+            (0..state.swings_between[i].len()).filter(|k| samples.contains(k)).map(Instant::Between);
+        for instant in samples.clone().map(Instant::Sample).chain(between).filter(stands) {
+            let local = self.forms.foot(i, instant);
+            form += local.foot;
+            let pose = PoseTangent::new(model, state, instant);
+            pose.cross(&local.turn_foot, &local.base_foot, &tangent, sink);
+        }
+        let mut total = pulled_back(&contact.point, &self.contacts[i][j], &form);
+        for (k, full) in stance.free_forces() {
+            let Some(timed) = &state.force_nodes[i][k] else { continue };
+            let (mut weight, full_weight) = (self.forces[i][k], &self.full_forces[i][k]);
+            if timed.is_timed() {
+                let warped = &state.warped_full_forces[i][k];
+                total += force_curvature(model, contact, (foothold, full), warped, full_weight, sink);
+            } else {
+                weight += full_weight;
+            }
+            let warped = &state.warped_forces[i][k];
+            total += force_curvature(model, contact, (foothold, &timed.node), warped, &weight, sink);
+            total += self.scatter_force(model, state, (i, j, k), &timed.node, sink);
+        }
+        own(foothold, &total, sink);
+    }
+
+    /// The form that couples a force with the pose, the foot and the foothold; returns what is due to the foothold alone.
+    fn scatter_force(
+        &self,
+        model: &Model,
+        state: &State,
+        (i, j, k): (usize, usize, usize),
+        node: &LinearNode,
+        sink: &mut Sink,
+    ) -> Matrix3<f64> {
+        let form = &self.forms.forces[i][k];
+        let contact = &state.contacts[i][j];
+        let foothold = &model.layout.feet[i].stances[j].foothold;
+        let force = Tangent::force(model, contact, node);
+        let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][k]);
+        let pose = PoseTangent::new(model, state, Instant::Sample(k));
+        let (turn, base) = (form.turn.transpose(), form.base.transpose());
+        let legs = model.legs[i].is_some();
+        for change in [&force, &by_foothold] {
+            pose.cross(&turn, &base, change, sink);
+            if legs {
+                let foot = Tangent::foot(model, state.foot(model, i, k), state.foot_node(i, k));
+                change.cross(&form.foot, &foot, sink);
+            }
+        }
+        force.cross(&form.foothold, &Tangent::foot(model, contact, foothold), sink);
+        let mixed = by_foothold.matrix().tr_mul(&form.foothold) * contact.point.jacobian;
+        mixed + mixed.transpose()
     }
 
     /// The part that is due to nodes whose weights depend on switches.
@@ -231,30 +300,41 @@ impl NodeCurvature {
     }
 }
 
-/// Adds ∂L/∂p · ∂²p and ⟨∂L/∂R, ∂²R⟩ of the base.
-fn scatter_base(
-    model: &Model,
-    base: &BaseNode,
-    node: &LinearNode,
-    by_position: &Vector3<f64>,
-    by_rotation: &Matrix3<f64>,
-    sink: &mut Sink,
-) {
-    // ⟨Λ, ∂_d ∂_e R⟩ with Q = Λ Rᵀ: ∂_e w_d · skew(Q) + w_eᵀ Q w_d − (w_d · w_e) tr Q.
-    let q = by_rotation * base.rotation().transpose();
-    let (axis, trace) = (skew_part(&q), q.trace());
-    let w = &base.turn.first;
-    let first = if model.spaces.base.is_warped() { 0 } else { 3 };
-    for d in first..6 {
-        for e in first..=d {
-            let mut value =
-                base.turn.second[e][d].dot(&axis) + w[e].dot(&(q * w[d])) - w[d].dot(&w[e]) * trace;
-            if d < 3 {
-                value += by_position.dot(&base.point.first[e].column(d));
-            }
-            sink.own(node, d, e, value);
+/// Second derivatives in the components of a node: those of weight · φ, and a form in the change of φ.
+fn pulled_back(point: &PointJet, weight: &Vector3<f64>, form: &Matrix3<f64>) -> Matrix3<f64> {
+    let curved = Matrix3::from_fn(|d, e| weight.dot(&point.first[e].column(d)));
+    curved + point.jacobian.tr_mul(&(form * point.jacobian))
+}
+
+/// Adds second derivatives in the components of one node.
+fn own(node: &LinearNode, second: &Matrix3<f64>, sink: &mut Sink) {
+    for d in 0..3 {
+        for e in 0..=d {
+            sink.own(node, d, e, second[(d, e)]);
         }
     }
+}
+
+/// Weight · ∂²f of a force f = J(c̄) f̄: adds ∂²f/∂c̄∂f̄ = ∂J and returns ∂²f/∂c̄² = ∂²J f̄.
+fn force_curvature(
+    model: &Model,
+    contact: &FootNode,
+    (foothold, node): (&LinearNode, &LinearNode),
+    warped: &Vector3<f64>,
+    weight: &Vector3<f64>,
+    sink: &mut Sink,
+) -> Matrix3<f64> {
+    if !model.spaces.feet.is_warped() {
+        return Matrix3::zeros();
+    }
+    let point = &contact.point;
+    for e in 0..3 {
+        let row = point.first[e].tr_mul(weight);
+        for d in 0..3 {
+            sink.pair((foothold, e), (node, d), row[d]);
+        }
+    }
+    Matrix3::from_fn(|e, d| weight.dot(&(point.second[e][d] * warped)))
 }
 
 /// Adds weight · ∂²y of a node y whose weights depend on switches.

@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::curvature::NodeCurvature;
 use super::model::Model;
-use super::sink::{Differential, Sink};
+use super::sink::Differential;
 use super::state::State;
-use super::tangent::Tangent;
+use super::tangent::{PoseTangent, Tangent};
 use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
@@ -29,67 +29,56 @@ pub fn add_derivative(
     let at = at.into();
     let world = state.base_at(at).rotation() * by;
     let arm = arm(model, state, (i, at));
-    let [turn, base, foot] = tangents(model, state, (i, at));
     // d(Rᵀ r) = Rᵀ ([r] δ + dp_i − dp).
-    turn.add_along(&(-arm.cross(&world)), scalar);
-    base.add_along(&-world, scalar);
+    PoseTangent::new(model, state, at).add_along(&-arm.cross(&world), &-world, scalar);
+    let foot = Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at));
     foot.add_along(&world, scalar);
 }
 
-/// Adds the second derivatives of λ · Rᵀ(p_i − p).
+/// Accumulates the second derivatives of λ · Rᵀ(p_i − p).
 pub fn add_curvature(
     model: &Model,
     state: &State,
     (i, at): (usize, impl Into<Instant>),
     lambda: &Vector3<f64>,
     curvature: &mut NodeCurvature,
-    sink: &mut Sink,
 ) {
     let at = at.into();
     let world = state.base_at(at).rotation() * lambda;
     curvature.add_base(at, &-world, &(arm(model, state, (i, at)) * lambda.transpose()));
     curvature.add_foot(model, i, at, world);
     // (δ × Rλ) · (dp_i − dp) = δᵀ [Rλ] (dp_i − dp).
-    let form = cross_matrix(&world);
-    let [turn, base, foot] = tangents(model, state, (i, at));
-    turn.cross(&form, &foot, sink);
-    turn.cross(&-form, &base, sink);
+    let cross = cross_matrix(&world);
+    let form = curvature.forms.foot_mut(i, at);
+    form.turn_foot += cross;
+    form.pose.turn_base -= cross;
 }
 
-/// Adds the second derivatives of ½ (change of r)ᵀ Q (change of r), with Q symmetric and in the base frame, without those of r itself.
+/// Accumulates the second derivatives of ½ (change of r)ᵀ Q (change of r), with Q symmetric and in the base frame, without those of
+/// r itself.
 pub fn add_quadratic(
     model: &Model,
     state: &State,
     (i, at): (usize, impl Into<Instant>),
-    form: &Matrix3<f64>,
-    sink: &mut Sink,
+    q: &Matrix3<f64>,
+    curvature: &mut NodeCurvature,
 ) {
     let at = at.into();
     let r = state.base_at(at).rotation();
-    let form = r * form * r.transpose();
+    let q = r * q * r.transpose();
     // R (change of r) = [arm] δ + dp_i − dp.
     let arm = cross_matrix(&arm(model, state, (i, at)));
-    let by_turn = arm.transpose() * form;
-    let [turn, base, foot] = tangents(model, state, (i, at));
-    turn.quadratic(&(by_turn * arm), sink);
-    base.quadratic(&form, sink);
-    foot.quadratic(&form, sink);
-    turn.cross(&by_turn, &foot, sink);
-    turn.cross(&-by_turn, &base, sink);
-    base.cross(&-form, &foot, sink);
+    let by_turn = arm.transpose() * q;
+    let form = curvature.forms.foot_mut(i, at);
+    form.pose.turn += by_turn * arm;
+    form.pose.turn_base -= by_turn;
+    form.pose.base += q;
+    form.turn_foot += by_turn;
+    form.base_foot -= q;
+    form.foot += q;
 }
 
 /// p_i − p, m.
 pub fn arm(model: &Model, state: &State, (i, at): (usize, Instant)) -> Vector3<f64> {
     state.foot(model, i, at).point.position - state.base_at(at).position()
-}
-
-/// How the base turns, how the base moves, and how the foot moves.
-pub fn tangents<'a>(model: &'a Model, state: &'a State, (i, at): (usize, Instant)) -> [Tangent<'a>; 3] {
-    let (base, node) = (state.base_at(at), model.layout.base_at(at));
-    [
-        Tangent::turn(model, base, node),
-        Tangent::base(model, base, node),
-        Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at)),
-    ]
 }

@@ -15,13 +15,14 @@
 //! | [`term`] | what a constraint and a cost have to provide |
 //! | [`sink`] | where they put their derivatives |
 //! | [`tangent`] | how ambient vectors change with the variables |
-//! | [`curvature`] | the second derivatives of the nodes themselves |
+//! | [`curvature`], [`local_forms`] | second derivatives, accumulated over all terms before they are scattered |
 //! | [`foot_in_base`], [`contact_force`], [`ground_normal`] | quantities that several of them are functions of |
 
 pub mod contact_force;
 pub mod curvature;
 pub mod foot_in_base;
 pub mod ground_normal;
+pub mod local_forms;
 pub mod model;
 pub mod sink;
 pub mod state;

@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::local_forms::PoseForm;
 use super::model::Model;
 use super::sink::{Differential, Sink};
-use super::state::{BaseNode, FootNode};
-use crate::trajectory::LinearNode;
+use super::state::{BaseNode, FootNode, State};
+use crate::trajectory::{Instant, LinearNode};
 
 /// How an ambient vector (a position, a force, the rotation vector of a turn) changes with the components of a node:
 /// component d of the node moves it by `columns[d]`, d in `first..last`.
@@ -23,7 +24,7 @@ pub struct Tangent<'a> {
 impl<'a> Tangent<'a> {
     /// Of the position of the base.
     pub fn base(model: &Model, base: &BaseNode, node: &'a LinearNode) -> Self {
-        Self::matrix(node, &base.point.jacobian, !model.spaces.base.is_warped())
+        Self::of(node, &base.point.jacobian, !model.spaces.base.is_warped())
     }
 
     /// Of the orientation of the base.
@@ -34,12 +35,12 @@ impl<'a> Tangent<'a> {
 
     /// Of the position of a foot.
     pub fn foot(model: &Model, foot: &FootNode, node: &'a LinearNode) -> Self {
-        Self::matrix(node, &foot.point.jacobian, !model.spaces.feet.is_warped())
+        Self::of(node, &foot.point.jacobian, !model.spaces.feet.is_warped())
     }
 
     /// Of a force J f̄ with its own variables.
     pub fn force(model: &Model, contact: &FootNode, node: &'a LinearNode) -> Self {
-        Self::matrix(node, &contact.point.jacobian, !model.spaces.feet.is_warped())
+        Self::of(node, &contact.point.jacobian, !model.spaces.feet.is_warped())
     }
 
     /// Of a force J f̄ with its foothold; empty where J is constant.
@@ -57,7 +58,12 @@ impl<'a> Tangent<'a> {
         Self { node, columns, first: 0, last, identity: false }
     }
 
-    fn matrix(node: &'a LinearNode, matrix: &Matrix3<f64>, identity: bool) -> Self {
+    /// The first three columns.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::from_columns(&[self.columns[0], self.columns[1], self.columns[2]])
+    }
+
+    fn of(node: &'a LinearNode, matrix: &Matrix3<f64>, identity: bool) -> Self {
         let mut columns = [Vector3::zeros(); 6];
         for d in 0..3 {
             columns[d] = matrix.column(d).into();
@@ -97,6 +103,52 @@ impl<'a> Tangent<'a> {
             let left = form * self.columns[d];
             for e in self.first..=d {
                 sink.own(self.node, d, e, left.dot(&self.columns[e]));
+            }
+        }
+    }
+}
+
+/// How the pose of the base changes with the components of its node: component d turns it by `turn[d]` and moves it by
+/// `position[d]`.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseTangent<'a> {
+    /// The node, (p̄, θ̄).
+    pub node: &'a LinearNode,
+    turn: [Vector3<f64>; 6],
+    position: [Vector3<f64>; 6],
+}
+
+impl<'a> PoseTangent<'a> {
+    /// At an instant.
+    pub fn new(model: &'a Model, state: &State, instant: Instant) -> Self {
+        let base = state.base_at(instant);
+        let mut position = [Vector3::zeros(); 6];
+        for d in 0..3 {
+            position[d] = base.point.jacobian.column(d).into();
+        }
+        Self { node: model.layout.base_at(instant), turn: base.turn.first, position }
+    }
+
+    /// Adds the derivatives of a scalar that changes by `by_turn` · δ + `by_base` · dp.
+    pub fn add_along(&self, by_turn: &Vector3<f64>, by_base: &Vector3<f64>, scalar: &mut impl Differential) {
+        for d in 0..6 {
+            scalar.node(self.node, d, by_turn.dot(&self.turn[d]) + by_base.dot(&self.position[d]));
+        }
+    }
+
+    /// The second derivative of a form with respect to components d and e of the node.
+    pub fn second(&self, form: &PoseForm, d: usize, e: usize) -> f64 {
+        let turned = form.turn * self.turn[e] + form.turn_base * self.position[e];
+        let moved = form.turn_base.tr_mul(&self.turn[e]) + form.base * self.position[e];
+        self.turn[d].dot(&turned) + self.position[d].dot(&moved)
+    }
+
+    /// Adds the second derivatives of δᵀ `turn` b + dpᵀ `base` b in the change b of another vector.
+    pub fn cross(&self, turn: &Matrix3<f64>, base: &Matrix3<f64>, other: &Tangent, sink: &mut Sink) {
+        for d in 0..6 {
+            let left = turn.tr_mul(&self.turn[d]) + base.tr_mul(&self.position[d]);
+            for e in other.first..other.last {
+                sink.pair((self.node, d), (other.node, e), left.dot(&other.columns[e]));
             }
         }
     }
