@@ -1,14 +1,15 @@
 //! Results for spreadsheets: `results.csv` and `metrics.csv`.
 
-use super::case::CaseRow;
+use super::case::{Case, CaseRow};
 use super::verdict::verdict;
 
+/// Columns of `results.csv`.
 const COLUMNS: &str = "case,robot,terrain,level,method,parameter,value,heading_deg,solved,passed,iterations,first_feasible,\
     continuation,violation,cpu_solve_s,cpu_map_s,map_cached,map_wall_s,conformal_error_percent,\
     conformal_error_most_percent,misfit_mm,inversions,energy_m3,\
     constraints_ms,jacobian_ms,hessian_ms,wall_evaluation_s,wall_linear_solver_s,wall_total_s,\
     replay,replay_decided_by,replay_s,verdict";
-
+/// Columns of `metrics.csv`.
 const METRIC_COLUMNS: &str = "case,robot,terrain,level,method,layer,metric,value,unit,pass,marginal,verdict";
 
 /// `results.csv`: one row per case; cells that do not apply are empty.
@@ -36,12 +37,7 @@ fn case_cells(row: &CaseRow) -> Vec<String> {
     let evaluation = motion.and_then(|m| m.evaluation.as_ref());
     // A case without a result is not solved.
     let verdict_cell = |value: Option<bool>| if row.outcome.is_err() { "false".into() } else { cell(value) };
-    vec![
-        case.name.clone(),
-        case.robot.clone(),
-        case.terrain.clone(),
-        case.level.clone(),
-        case.method.clone(),
+    let cells = [
         cell(case.parameter.map(|(name, _)| name)),
         cell(case.parameter.map(|(_, value)| value)),
         cell(case.heading),
@@ -70,19 +66,14 @@ fn case_cells(row: &CaseRow) -> Vec<String> {
         cell(track.and_then(|t| Some(t.first_failing()?.name.clone()))),
         cell(track.map(|t| t.seconds)),
         verdict(row),
-    ]
+    ];
+    identity(case).into_iter().chain(cells).collect()
 }
 
 fn metric_rows(row: &CaseRow) -> Vec<Vec<String>> {
-    let case = &row.case;
     let metrics = row.track().map_or(&[][..], |track| &track.metrics);
     let cells = metrics.iter().map(|metric| {
-        vec![
-            case.name.clone(),
-            case.robot.clone(),
-            case.terrain.clone(),
-            case.level.clone(),
-            case.method.clone(),
+        let cells = [
             metric.layer.clone(),
             metric.name.clone(),
             cell(metric.value),
@@ -90,9 +81,15 @@ fn metric_rows(row: &CaseRow) -> Vec<Vec<String>> {
             metric.pass.to_string(),
             metric.marginal.to_string(),
             metric.verdict.name().to_owned(),
-        ]
+        ];
+        identity(&row.case).into_iter().chain(cells).collect()
     });
     cells.collect()
+}
+
+/// The first cells of every row.
+fn identity(case: &Case) -> [String; 5] {
+    [&case.name, &case.robot, &case.terrain, &case.level, &case.method].map(String::clone)
 }
 
 /// A value; none gives an empty cell.

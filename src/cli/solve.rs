@@ -5,17 +5,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
 use super::figures::figures;
 use super::progress_line::ProgressLine;
-use crate::check::CheckReport;
 use crate::files::{ensure_writable, write_atomically};
 use crate::pipeline::{self, Planned};
-use crate::plan::Plan;
-use crate::planner::Motion;
 use crate::planner::derivatives::DerivativeError;
 use crate::scenario::{self, LoadedScenario};
 use crate::{Error, Result, report};
@@ -61,7 +58,6 @@ pub(super) struct SolveArguments {
 pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<Ending> {
     let start = Instant::now();
     let loaded = load(arguments)?;
-    let scenario = &loaded.scenario;
     let output = output(arguments)?;
     let plot =
         (!arguments.no_plot).then(|| arguments.plot.clone().unwrap_or_else(|| beside(&output, ".svg")));
@@ -77,40 +73,17 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     })?;
     // Interrupted before the first iterate: there is no plan to write.
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
-    let Planned { prepared, map: built, plan, motion, check: found, derivatives } = planned;
-    plan.write(&output)?;
+    planned.plan.write(&output)?;
     if let Some(plot) = &plot {
-        write_atomically(plot, report::sheet(&plan).as_bytes())?;
+        write_atomically(plot, report::sheet(&planned.plan).as_bytes())?;
     }
     drop(progress);
 
     let seconds = start.elapsed().as_secs_f64();
-    if let Some(errors) = &derivatives {
-        console.result(&format!("{}\n", report::derivative_table(errors)));
-    }
-    console.result(&format!("{}\n", report::violation_table(&motion.violations, scenario.solver.tolerance)));
-    console.result(&format!("{}\n", report::check_table(&found, console.has_color())));
-    console.result(&summary(&plan, &motion, &found, &output, seconds));
-    console.object(&json!({
-        "plan": output,
-        "plot": plot,
-        "solved": motion.solved,
-        "passed": found.passed,
-        "interrupted": motion.interrupted,
-        "solver": plan.meta.solver,
-        "terrain": prepared.ground.report,
-        "map": built.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
-        "violations": motion.violations,
-        "derivatives": derivatives,
-        "checks": found.rows,
-        "figures": figures(&found),
-    }));
-    let right_derivatives = derivatives.as_ref().is_none_or(|errors| errors.iter().all(is_right));
-    Ok(match motion.interrupted {
-        true => Ending::Interrupted,
-        false if motion.solved && found.passed && right_derivatives => Ending::Good,
-        false => Ending::NotGood,
-    })
+    print_tables(&planned, loaded.scenario.solver.tolerance, console);
+    console.result(&summary(&planned, &output, seconds));
+    console.object(&object(&planned, &output, plot.as_deref()));
+    Ok(ending(&planned))
 }
 
 fn load(arguments: &SolveArguments) -> Result<LoadedScenario> {
@@ -137,12 +110,16 @@ fn beside(plan: &Path, ending: &str) -> PathBuf {
     plan.with_file_name(format!("{stem}{ending}"))
 }
 
-fn is_right(error: &DerivativeError) -> bool {
-    error.missing == 0 && error.largest <= DERIVATIVE_TOLERANCE
+fn print_tables(planned: &Planned, tolerance: f64, console: &Console) {
+    if let Some(errors) = &planned.derivatives {
+        console.result(&format!("{}\n", report::derivative_table(errors)));
+    }
+    console.result(&format!("{}\n", report::violation_table(&planned.motion.violations, tolerance)));
+    console.result(&format!("{}\n", report::check_table(&planned.check, console.has_color())));
 }
 
-fn summary(plan: &Plan, motion: &Motion, found: &CheckReport, output: &Path, seconds: f64) -> String {
-    let solver = &plan.meta.solver;
+fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
+    let (motion, solver) = (&planned.motion, &planned.plan.meta.solver);
     let [total, map, evaluation, linear] =
         [seconds, solver.seconds.map, solver.seconds.evaluation, solver.seconds.linear_solver]
             .map(report::number);
@@ -153,7 +130,39 @@ fn summary(plan: &Plan, motion: &Motion, found: &CheckReport, output: &Path, sec
          Written: {}",
         motion.status,
         motion.iterations,
-        report::check_counts(&found.rows),
+        report::check_counts(&planned.check.rows),
         output.display()
     )
+}
+
+/// The result for `--json`.
+fn object(planned: &Planned, output: &Path, plot: Option<&Path>) -> Value {
+    let Planned { prepared, map, plan, motion, check, derivatives } = planned;
+    json!({
+        "plan": output,
+        "plot": plot,
+        "solved": motion.solved,
+        "passed": check.passed,
+        "interrupted": motion.interrupted,
+        "solver": plan.meta.solver,
+        "terrain": prepared.ground.report,
+        "map": map.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
+        "violations": motion.violations,
+        "derivatives": derivatives,
+        "checks": check.rows,
+        "figures": figures(check),
+    })
+}
+
+fn ending(planned: &Planned) -> Ending {
+    let right_derivatives = planned.derivatives.as_ref().is_none_or(|errors| errors.iter().all(is_right));
+    match planned.motion.interrupted {
+        true => Ending::Interrupted,
+        false if planned.motion.solved && planned.check.passed && right_derivatives => Ending::Good,
+        false => Ending::NotGood,
+    }
+}
+
+fn is_right(error: &DerivativeError) -> bool {
+    error.missing == 0 && error.largest <= DERIVATIVE_TOLERANCE
 }
