@@ -3,18 +3,27 @@
 /// Everything that can go wrong before or after a solve. A solve that does not converge is not an error but a result.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The user's input is wrong: says what, where, and what to do. Exit code 2.
+    /// The user's input is wrong; the message says what is wrong, where, and what to do. Exit code 2.
     #[error("{0}")]
     Input(String),
+    /// As [`Error::Input`], from code that knows the key of the scenario but not the file that set it.
+    /// `LoadedScenario::locate` adds file and line.
+    #[error("{key}: {what}")]
+    Key {
+        /// The dotted key, for instance `gait.phases[1]`.
+        key: String,
+        /// What was given and what is allowed.
+        what: String,
+    },
     /// A file could not be read or written. Exit code 2.
     #[error("{path}: {source}")]
     Io {
         /// The file.
         path: String,
-        /// What the operating system said.
+        /// What the operating system reported.
         source: std::io::Error,
     },
-    /// Something inside failed that no input should cause.
+    /// A failure that no input should cause.
     #[error("internal error: {0}")]
     Internal(String),
 }
@@ -26,6 +35,11 @@ impl Error {
     /// An input error with a message.
     pub fn input(message: impl Into<String>) -> Self {
         Error::Input(message.into())
+    }
+
+    /// An error in the value of a key of the scenario.
+    pub fn key(key: impl Into<String>, what: impl std::fmt::Display) -> Self {
+        Error::Key { key: key.into(), what: what.to_string() }
     }
 
     /// An I/O error at a path.

@@ -3,7 +3,7 @@
 //! A scenario (terrain, robot, start, goal, gait) becomes a plan: where the base and the feet are and which forces the
 //! ground exerts, at every instant of a motion that obeys the laws of mechanics and contact. The method is that of Pan,
 //! Chen, Fang, Bretl, Gao and Wu, *Environment Warped Gait Trajectory Optimization for Complex Terrains* (RA-L 2022);
-//! equation numbers in this documentation are the paper's. What was mended there is told in `docs/method.md`.
+//! equation numbers in this documentation are the paper's. `docs/method.md` lists what was corrected.
 //!
 //! # The problem
 //!
@@ -22,7 +22,7 @@
 //! p_x, p_y at T are the goal; the start is given, at rest
 //! ```
 //!
-//! and limits of force, slope and clearance. When which foot stands is given by the gait.
+//! and limits of force, slope and clearance. The gait determines which foot stands when.
 //!
 //! The *direct* formulation takes splines of p, θ (Euler angles of R), pᵢ and fᵢ as its variables. The *warped* one takes
 //! splines in a space F in which the ground is the plane z̄ = 0, and pushes them forward by a map φ: F → A with
@@ -32,31 +32,34 @@
 //! p = φ(p̄)    R = 𝒫(J(p̄)) R(θ̄)    pᵢ = φ(p̄ᵢ)    fᵢ = J(p̄ᵢ) f̄ᵢ        𝒫(J): the rotation nearest to J  (Eq. 12, 13)
 //! ```
 //!
-//! A straight line in F hugs the ground in A, and the ground's shape is the map's business alone. Everything after that
-//! push is the same code for both, so that a difference between the two is a difference of formulation.
+//! A straight line in F follows the ground in A, and only the map knows the shape of the ground. Everything after the
+//! push-forward is the same code for both, so that a difference between the two is a difference of formulation.
 //!
-//! # The way of the data
+//! # Data flow
 //!
-//! Data passes through the modules in this order, and this is the order to read them in.
+//! Data passes through the modules in this order, which is also the order to read them in.
 //!
 //! | module | takes | gives |
 //! | --- | --- | --- |
+//! | [`input`] | TOML files | their values with the line of every key |
 //! | [`scenario`], [`robot`] | TOML files | plain data, or an error that names line, key and what is allowed |
 //! | [`terrain`] | `[terrain]`, images, arrays | heights on a grid: holes filled, smoothed, with the error of the fit |
 //! | [`heightfield`] | heights | h as a C² spline with derivatives |
 //! | [`warp`] | h | φ as a tri-cubic B-spline whose bottom is the terrain, with a report of its quality |
 //! | [`trajectory`] | the gait | which variables there are, and every sample as a linear combination of them |
-//! | [`constraints`], [`costs`] | samples in A | rows and terms, with first and second derivatives |
-//! | [`nlp`] | all of these | one sparse nonlinear program, its guess, and what to try when it does not converge |
+//! | [`nlp`] | variables | the ambient nodes, and the language in which constraints and costs are written |
+//! | [`constraints`], [`costs`] | ambient nodes | rows and terms, with first and second derivatives |
+//! | [`planner`] | all of these | one sparse nonlinear program, its guess, and what to try when it does not converge |
 //! | [`ipopt`] | a nonlinear program | its solution |
 //! | [`plan`] | the motion | samples at ten times the rate, exact splines and provenance in one `.npz` file |
-//! | [`check`] | a plan file alone | every law again, by other code, between the samples too |
+//! | [`check`] | a plan file alone | every law again, by independent code, between the samples too |
 //! | [`report`] | plan, checks | tables and drawings |
-//! | [`leg`] | a contact point in the base frame | joint angles, knee, what a force asks of the motors |
+//! | [`leg`] | a contact point in the base frame | joint angles, the knee, the torques that a force requires |
 //! | [`pipeline`] | a scenario | all of the above in order |
 //! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
 //! | [`replay`] | a report of the Python package | its verdict |
 //! | [`cli`] | arguments | exit codes |
+//! | [`files`], [`digest`] | | files written whole or not at all, `.npz` archives, SHA-256 |
 //!
 //! # Notation
 //!
@@ -67,15 +70,15 @@
 //! | J, ∂J | `jacobian`, `jacobian_derivative` | of φ, (3, 3), (3, 3, 3) |
 //! | 𝒫 | `project_to_rotation` | (3, 3) → SO(3), Eq. 12 |
 //! | h, n | `height`, `normal` | of the ground; m, unit vector |
-//! | p, θ, R | `base_position`, `base_euler`, `base_rotation` | centre of mass, m; ZYX Euler angles, rad; body to world |
+//! | p, θ, R | `base_position`, `base_euler`, `base_rotation` | center of mass, m; ZYX Euler angles, rad; body to world |
 //! | pᵢ, fᵢ | `foot_position`, `foot_force` | m; N, of the ground on the robot |
 //! | x̄ | `warped_…` | the same thing in F |
 //! | T, Δt | `horizon`, `time_step` | s |
 //! | ν | `friction` | coefficient, 1 |
-//! | m, I, g | `mass`, `inertia`, `gravity` | kg; about the centre of mass in the base frame, kg m²; m/s² |
+//! | m, I, g | `mass`, `inertia`, `gravity` | kg; about the center of mass in the base frame, kg m²; m/s² |
 //!
 //! World frame: x forward, y left, z up, SI units. Inside the nonlinear program forces are in m g and torques in
-//! m g · 1 m, so that a tolerance means about the same for every row.
+//! m g · 1 m, so that one tolerance suits every row.
 
 pub mod bench;
 pub mod check;
@@ -86,6 +89,7 @@ pub mod digest;
 pub mod error;
 pub mod files;
 pub mod heightfield;
+pub mod input;
 pub mod ipopt;
 pub mod leg;
 pub mod nlp;

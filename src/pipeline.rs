@@ -1,13 +1,12 @@
 //! From a scenario to a checked plan: terrain → map → NLP → plan → check. `warpgait solve`, `warpgait bench` and Python's
 //! `warpgait.solve` all run this.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::Result;
 use crate::check::{CheckReport, check};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
@@ -15,12 +14,10 @@ use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
 use crate::planner::derivatives::{self, DerivativeError};
 use crate::planner::{self, GaitProblem, Host, Motion, Progress, Task};
-use crate::robot::Robot;
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
 use crate::terrain::{self, Ground};
 use crate::trajectory::Gait;
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
-use crate::{Error, Result, digest};
 
 /// How many variables a check of the derivatives perturbs.
 const DERIVATIVE_VARIABLES: usize = 200;
@@ -87,22 +84,18 @@ impl BuiltMap {
     }
 }
 
-/// All that is read before anything is computed.
+/// All that a scenario names, read and built before anything is computed.
 pub struct Prepared {
-    /// The robot.
-    pub robot: Robot,
     /// Its gait.
     pub gait: Gait,
     /// The ground and how it came about.
     pub ground: Ground,
     /// The ground's surface, shared by all models.
     pub surface: Arc<Heightfield>,
-    /// File name → SHA-256.
-    pub inputs: BTreeMap<String, String>,
 }
 
 impl Prepared {
-    /// Reads robot and terrain and refuses what does not fit together.
+    /// Builds the gait and the terrain, and refuses what does not fit together.
     ///
     /// # Errors
     /// For input that is wrong or files that cannot be read.
@@ -110,21 +103,20 @@ impl Prepared {
         // A request to stop takes effect at the first iteration.
         let _ = observer(&Event::Step(Step::Terrain));
         let scenario = &loaded.scenario;
-        let robot = Robot::load(&scenario.robot, &loaded.base_dir)?;
-        let gait = Gait::of(scenario, &robot)?;
-        let mut ground = terrain::build(&scenario.terrain, &loaded.base_dir)?;
+        let gait = Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
+        let ground = terrain::build(&scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
         loaded.ensure_inside(ground.field.extent())?;
         for note in &ground.report.notes {
             let _ = observer(&Event::Note(&format!("terrain: {note}")));
         }
-        let inputs = inputs(loaded, &mut ground)?;
         let surface = Arc::new(ground.field.clone());
-        Ok(Self { robot, gait, ground, surface, inputs })
+        Ok(Self { gait, ground, surface })
     }
 
     /// What the planner is given.
     pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
-        Task { scenario: &loaded.scenario, robot: &self.robot, gait: &self.gait, ground: &self.surface, map }
+        let (scenario, robot) = (&loaded.scenario, &loaded.robot);
+        Task { scenario, robot, gait: &self.gait, ground: &self.surface, map }
     }
 }
 
@@ -132,7 +124,7 @@ impl Prepared {
 pub struct Planned {
     /// What it was planned from.
     pub prepared: Prepared,
-    /// The map, in the warped formulation.
+    /// The map, in all formulations but the direct one.
     pub map: Option<BuiltMap>,
     /// The plan, with the results of the check.
     pub plan: Plan,
@@ -160,14 +152,16 @@ pub fn run(
     let start = Instant::now();
     let map = match scenario.formulation {
         Formulation::Direct => None,
-        Formulation::Warped => match build_map(&prepared.surface, &scenario.map, true, observer)? {
-            Some(built) => {
-                built.report.ensure_injective()?;
-                built.report_warnings(observer);
-                Some(built)
+        Formulation::Warped | Formulation::Hybrid => {
+            match build_map(&prepared.surface, &scenario.map, true, observer)? {
+                Some(built) => {
+                    built.report.ensure_injective()?;
+                    built.report_warnings(observer);
+                    Some(built)
+                }
+                None => return Ok(None),
             }
-            None => return Ok(None),
-        },
+        }
     };
     let map_seconds = start.elapsed().as_secs_f64();
     let task = prepared.task(loaded, map.as_ref().map(|built| &built.map));
@@ -183,14 +177,7 @@ pub fn run(
     let motion = planner::solve(&task, &mut Planning { spec: &scenario.map, observer: &mut *observer })?;
 
     let _ = observer(&Event::Step(Step::Plan));
-    let provenance = Provenance {
-        scenario,
-        text: &loaded.text,
-        robot: &prepared.robot,
-        ground: &prepared.ground,
-        inputs: prepared.inputs.clone(),
-        map_seconds,
-    };
+    let provenance = Provenance { loaded, ground: &prepared.ground, map_seconds };
     let mut plan = Plan::from_motion(&motion, &provenance);
     let check = check(&plan)?;
     plan.meta.checks = check.rows.clone();
@@ -234,25 +221,6 @@ pub fn build_map(
     }
     let (map, report, cached) = found?;
     Ok(Some(BuiltMap { map, report, cached }))
-}
-
-/// SHA-256 of every file that goes in.
-fn inputs(loaded: &LoadedScenario, ground: &mut Ground) -> Result<BTreeMap<String, String>> {
-    let mut inputs: BTreeMap<String, String> = ground.inputs.drain(..).collect();
-    let robot = loaded.scenario.robot.file.as_ref().map(|file| (file.clone(), loaded.base_dir.join(file)));
-    let scenario = loaded
-        .path
-        .as_ref()
-        .and_then(|path| path.file_name().map(|name| (name.to_string_lossy().into_owned(), path.clone())));
-    for (name, path) in robot.into_iter().chain(scenario) {
-        inputs.insert(name, sha256(&path)?);
-    }
-    Ok(inputs)
-}
-
-fn sha256(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    Ok(digest::sha256_hex(&bytes))
 }
 
 /// At the guess, in directions spread over all variables.

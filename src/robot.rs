@@ -6,23 +6,41 @@ use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::digest::sha256_hex;
+use crate::input::{self, Document};
 use crate::leg::Leg;
-use crate::scenario::RobotSpec;
-use crate::scenario::document::Document;
 use crate::{Error, Result};
 
-/// The robots that come with the program: name and content of `robots/NAME.toml`.
+/// The robots that ship with the program: name and content of `robots/NAME.toml`.
 const SHIPPED: &[(&str, &str)] = &[
     ("anymal_towr", include_str!("../robots/anymal_towr.toml")),
     ("anymal_b", include_str!("../robots/anymal_b.toml")),
     ("anymal_c", include_str!("../robots/anymal_c.toml")),
 ];
 
-/// An axis-aligned box in the base frame, origin at the centre of mass, m.
+/// `[robot]` of a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RobotSpec {
+    /// Name of a shipped robot.
+    pub name: String,
+    /// A robot file instead, relative to the scenario.
+    pub file: Option<String>,
+    /// Names of the feet that may pull on the ground.
+    pub adhesive_feet: Vec<String>,
+}
+
+impl Default for RobotSpec {
+    fn default() -> Self {
+        Self { name: "anymal_b".into(), file: None, adhesive_feet: Vec::new() }
+    }
+}
+
+/// An axis-aligned box in the base frame, origin at the center of mass, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Box3 {
-    /// Centre, m.
+    /// Center, m.
     pub center: [f64; 3],
     /// Half of the edge lengths, m.
     #[schemars(inner(range(min = 0.001, max = 10.0)))]
@@ -33,13 +51,13 @@ pub struct Box3 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Foot {
-    /// `LF`, `RF`, `LH`, `RH` for ANYmal.
+    /// Its name; `LF`, `RF`, `LH`, `RH` for ANYmal.
     pub name: String,
-    /// Where the foot stands at rest, base frame, m from the centre of mass.
+    /// Where the foot stands at rest, base frame, m from the center of mass.
     pub nominal: [f64; 3],
     /// The reachable box 𝓡ᵢ of Eq. 4.
     pub reach: Box3,
-    /// The leg, where it is known: joints then keep their speeds and torques.
+    /// The leg, if known: the limits of its joints' speeds and torques then hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leg: Option<Leg>,
 }
@@ -50,56 +68,53 @@ pub struct Foot {
 pub struct Robot {
     /// Name, as in `robots/NAME.toml`.
     pub name: String,
-    /// Where the figures come from.
+    /// Where the values come from.
     pub source: String,
     /// Total mass, kg.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub mass: f64,
-    /// Inertia about the centre of mass in the base frame at the nominal stance, kg m².
+    /// Inertia about the center of mass in the base frame at the nominal stance, kg m².
     pub inertia: [[f64; 3]; 3],
-    /// Length of a gait's cycle where the scenario names none, s; 1 s if the robot's file names none either.
+    /// Duration of a gait's cycle if the scenario gives none, s; 1 s if the robot's file gives none either.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 20.0))]
     pub gait_cycle: Option<f64>,
-    /// The torso's box, for clearance over the ground.
+    /// The torso's box, for its clearance above the ground.
     pub torso: Box3,
     /// The feet, in the order of the plan's `foot_names`.
     #[schemars(length(min = 1, max = 16))]
     pub feet: Vec<Foot>,
+    /// Name as given in the scenario and SHA-256 (hexadecimal) of the file it was read from; none for a shipped robot.
+    #[serde(skip)]
+    pub input: Option<(String, String)>,
 }
 
 impl Robot {
-    /// The robot that a scenario names: a shipped one, or a file relative to `base_dir`. Refuses unknown names, figures
-    /// that no rigid body has, and adhesive feet that the robot lacks.
+    /// The robot that a scenario names: a shipped one, or a file relative to `base_dir`.
+    ///
+    /// # Errors
+    /// For unknown names, files that cannot be read or have unknown or missing keys, and values that no rigid body or leg has.
     pub fn load(spec: &RobotSpec, base_dir: &Path) -> Result<Self> {
-        let document = match &spec.file {
-            Some(file) => Document::read(&base_dir.join(file))?.0,
-            None => match SHIPPED.iter().find(|(name, _)| *name == spec.name) {
-                Some((name, text)) => Document::parse(&format!("robots/{name}.toml"), text)?,
-                None => {
-                    let what = "unknown; a robot of your own is given as robot.file = \"path.toml\"";
-                    return Err(Error::input(format!(
-                        "robot.name = \"{}\": {what}; available: {}",
-                        spec.name,
-                        Self::shipped().join(", ")
-                    )));
-                }
-            },
-        };
-        let robot = Self::from_document(&document)?;
-        for (i, foot) in spec.adhesive_feet.iter().enumerate() {
-            let names: Vec<&str> = robot.feet.iter().map(|f| f.name.as_str()).collect();
-            let what = match () {
-                () if !names.contains(&foot.as_str()) => format!("is not a foot of {}", robot.name),
-                () if spec.adhesive_feet[..i].contains(foot) => "is there twice".into(),
-                () => continue,
-            };
-            return Err(Error::input(format!(
-                "robot.adhesive_feet: \"{foot}\" {what}; its feet: {}",
-                names.join(", ")
-            )));
+        if let Some(file) = &spec.file {
+            let (document, text) = Document::read(&base_dir.join(file)).map_err(|e| match e {
+                Error::Io { .. } => Error::key("robot.file", e),
+                other => other,
+            })?;
+            let input = Some((file.clone(), sha256_hex(text)));
+            return Ok(Self { input, ..Self::from_document(&document)? });
         }
-        Ok(robot)
+        let Some((name, text)) = SHIPPED.iter().find(|(name, _)| *name == spec.name) else {
+            let shipped = Self::shipped();
+            let guess = input::closest(&spec.name, &shipped)
+                .map_or(String::new(), |name| format!("did you mean \"{name}\"? "));
+            let what = format!(
+                "given \"{}\", which does not ship with warpgait; {guess}allowed: {}, or a file of your own as robot.file = \"path.toml\"",
+                spec.name,
+                shipped.join(", ")
+            );
+            return Err(Error::key("robot.name", what));
+        };
+        Self::from_document(&Document::parse(&format!("robots/{name}.toml"), text)?)
     }
 
     /// Names of the shipped robots.
@@ -107,15 +122,20 @@ impl Robot {
         SHIPPED.iter().map(|(name, _)| *name).collect()
     }
 
+    /// Names of its feet, in their order.
+    pub fn foot_names(&self) -> Vec<&str> {
+        self.feet.iter().map(|foot| foot.name.as_str()).collect()
+    }
+
     fn from_document(document: &Document) -> Result<Self> {
-        let robot: Self = document.typed()?;
+        let robot: Self = input::read_as(document)?;
         let inertia = Matrix3::from_fn(|i, j| robot.inertia[i][j]);
         let refuse = |what: String| Err(document.error("inertia", what));
         let size = inertia.norm();
         if (inertia - inertia.transpose()).norm() > 1e-6 * size {
             return refuse(format!("given {:?}, allowed: a symmetric matrix", robot.inertia));
         }
-        // The principal moments of a body: each is positive and at most the sum of the other two.
+        // Each principal moment of a rigid body is positive and at most the sum of the other two.
         let moments = inertia.symmetric_eigenvalues();
         let largest = moments.max();
         if moments.min() <= 0.0 {
@@ -143,7 +163,7 @@ impl Robot {
                     return Err(document.error(&format!("{key}.leg.bend"), what));
                 }
                 if !leg.reaches(foot.nominal) {
-                    let what = "does not reach the foot's nominal place; lengths and hip are in m from the centre of mass";
+                    let what = "does not reach the foot's nominal position; lengths and hip are in m from the center of mass";
                     return Err(document.error(&format!("{key}.leg"), what));
                 }
             }
@@ -153,7 +173,7 @@ impl Robot {
 }
 
 impl Box3 {
-    /// Whether a point lies in the box (borders included).
+    /// Whether a point lies in the box, its surface included.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         (0..3).all(|axis| (point[axis] - self.center[axis]).abs() <= self.half_size[axis])
     }
@@ -198,13 +218,19 @@ mod tests {
     }
 
     #[test]
-    fn unknown_names_say_what_there_is() {
-        let spec = RobotSpec { name: "spot".into(), ..Default::default() };
+    fn unknown_names_are_refused_with_those_that_exist() {
+        let spec = RobotSpec { name: "anymal_tower".into(), ..Default::default() };
         let message = Robot::load(&spec, Path::new(".")).unwrap_err().to_string();
-        assert!(message.contains("anymal_towr"), "{message}");
-        let adhesive_feet = vec!["LF".into(), "XX".into()];
-        let spec = RobotSpec { name: "anymal_towr".into(), adhesive_feet, ..Default::default() };
-        let message = Robot::load(&spec, Path::new(".")).unwrap_err().to_string();
-        assert!(message.contains("\"XX\" is not a foot") && message.contains("LF, RF, LH, RH"), "{message}");
+        assert!(message.contains("did you mean \"anymal_towr\"?"), "{message}");
+        assert!(Robot::shipped().iter().all(|name| message.contains(name)), "{message}");
+    }
+
+    #[test]
+    fn the_digest_of_a_file_is_that_of_what_was_read() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("r.toml"), SHIPPED[0].1).unwrap();
+        let spec = RobotSpec { file: Some("r.toml".into()), ..Default::default() };
+        let robot = Robot::load(&spec, folder.path()).unwrap();
+        assert_eq!(robot.input, Some(("r.toml".into(), sha256_hex(SHIPPED[0].1))));
     }
 }

@@ -1,9 +1,7 @@
 //! The check: a good plan passes every law; a plan that breaks one law fails that one and no other.
 
-mod common;
-
-use common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
-use warpgait::check::{LAWS, Limits, check, check_with};
+use crate::common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
+use warpgait::check::{CheckLimits, LAWS, check, check_with};
 use warpgait::plan::Plan;
 
 const WEIGHT: f64 = MASS * GRAVITY;
@@ -229,7 +227,7 @@ fn limits_can_be_changed() {
     let path = folder.path().join("limits.toml");
     let read = |text: &str| {
         std::fs::write(&path, text).unwrap();
-        Limits::default().read(&path)
+        CheckLimits::default().read(&path)
     };
     let mut heavy = standing();
     heavy.meta.robot.mass *= 1.02;
@@ -240,7 +238,7 @@ fn limits_can_be_changed() {
     let message = read("newton_rsm = 5").unwrap_err().to_string();
     assert!(message.contains("did you mean `newton_rms`?"), "{message}");
     assert!(read("newton_rms = nan").is_err() && read("newton_rms = \"a\"").is_err() && read("= 3").is_err());
-    let strict = check_with(&standing(), &Limits::new(true)).unwrap();
+    let strict = check_with(&standing(), &CheckLimits::new(true)).unwrap();
     assert!(
         strict.passed && strict.rows.iter().any(|row| row.name == "angular_speed_max" && row.limit == 1.0)
     );

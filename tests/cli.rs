@@ -1,9 +1,8 @@
 //! The command line: exit codes, one message, no incomplete files.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common;
 use assert_cmd::Command;
 use serde_json::Value;
 

@@ -12,8 +12,7 @@ use warpgait::planner::problem::Choice;
 use warpgait::planner::{GaitProblem, derivatives, guess};
 use warpgait::robot::Robot;
 use warpgait::scenario::Scenario;
-use warpgait::trajectory::Gait;
-use warpgait::trajectory::space::Space;
+use warpgait::trajectory::{Gait, Spaces};
 use warpgait::warp::WarpMap;
 
 /// Largest relative error allowed; the step of the differences is 1e-5, their own error some 1e-9.
@@ -44,16 +43,11 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
     let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
     let field = Arc::new(ground.field);
-    let space = match formulation {
-        "direct" => Space::Direct,
-        _ => {
-            // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
-            let shear = WarpMap::shear(&field, &scenario.map).expect("a map");
-            Space::Warped(Box::new(bent(&shear)))
-        }
-    };
+    // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
+    let map = bent(&WarpMap::shear(&field, &scenario.map).expect("a map"));
+    let spaces = Spaces::of(scenario.formulation, Some(Arc::new(map))).expect("spaces");
     let gait = Gait::of(&scenario, &robot).expect("a gait");
-    let model = Model::new(&scenario, &robot, &gait, field, space).expect("a model");
+    let model = Model::new(&scenario, &robot, &gait, field, spaces);
     let x = guess::guess(&scenario, &model).expect("a guess");
     GaitProblem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
 }
@@ -117,7 +111,7 @@ fn move_switches(problem: &GaitProblem, noise: &[f64], x: &mut [f64]) {
 #[test]
 fn durations_match_differences_wherever_the_switches_are() {
     let gait = "[gait]\ncycle = 0.8\noptimize_durations = true";
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         for (name, terrain) in [TERRAINS[0], TERRAINS[2]] {
             check(problem(terrain, formulation, gait), &format!("{name}, {formulation}"));
         }
@@ -125,7 +119,7 @@ fn durations_match_differences_wherever_the_switches_are() {
         check(problem(TERRAINS[1].1, formulation, &law), "pcdm-backward, conformal");
     }
     // With known legs: their speeds and torques follow the switches too.
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
             for (name, terrain) in TERRAINS {
                 check(
@@ -165,8 +159,15 @@ fn direct_blocks_match_differences_on_all_terrains() {
 }
 
 #[test]
+fn hybrid_blocks_match_differences_on_all_terrains() {
+    for (name, terrain) in TERRAINS {
+        check(problem(terrain, "hybrid", "[contact]\nmax_slope = 0.9"), name);
+    }
+}
+
+#[test]
 fn other_laws_and_cones_match_differences() {
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         for extra in ["[physics]\nlaw = \"pcdm-backward\"", "[contact]\ncone = \"conformal\""] {
             check(problem(TERRAINS[1].1, formulation, extra), extra);
         }
@@ -176,16 +177,18 @@ fn other_laws_and_cones_match_differences() {
 #[test]
 fn coarse_knots_and_newton_euler_match_differences() {
     let coarse = "[discretization]\nbase_knots = 3\nforce_knots = 2";
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         check(problem(TERRAINS[2].1, formulation, coarse), coarse);
     }
-    check(problem(TERRAINS[2].1, "direct", "[physics]\nlaw = \"newton-euler\""), "newton-euler");
+    for formulation in ["direct", "hybrid"] {
+        check(problem(TERRAINS[2].1, formulation, "[physics]\nlaw = \"newton-euler\""), "newton-euler");
+    }
 }
 
 /// Of a robot with known legs: joint speeds, torques and clearance of the knees besides.
 #[test]
 fn blocks_of_known_legs_match_differences_on_all_terrains() {
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
             for (terrain, text) in TERRAINS {
                 let problem = problem_of(robot, text, formulation, "");
@@ -203,7 +206,7 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
 #[test]
 fn two_threads_evaluate_what_one_does() {
     let durations = "[gait]\ncycle = 0.8\noptimize_durations = true\n";
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         for (robot, gait) in [("anymal_towr", ""), ("anymal_c", ""), ("anymal_towr", durations)] {
             let values = |threads: usize| {
                 let extra = format!("{gait}[solver]\nthreads = {threads}");

@@ -1,11 +1,9 @@
 //! Optimized phase durations: motions are solved and hold like others, their phases differ from the nominal ones and keep to
 //! their bounds, and they cost less.
 
-mod common;
-
 use std::path::Path;
 
-use common::solved;
+use crate::common::solved;
 use warpgait::check::check;
 use warpgait::pipeline;
 use warpgait::plan::Plan;
@@ -27,7 +25,7 @@ const TERRAINS: [&str; 2] = [
 #[test]
 fn free_switches_give_better_motions_that_hold() {
     for terrain in TERRAINS {
-        for formulation in ["warped", "direct"] {
+        for formulation in ["warped", "direct", "hybrid"] {
             let text = |gait: &str| {
                 format!("formulation = \"{formulation}\"\nhorizon = 4.0\n[terrain]\n{terrain}[gait]\n{gait}")
             };

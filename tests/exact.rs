@@ -1,10 +1,9 @@
 //! The exact motion of a plan goes through its samples, between them it is what its derivatives say, and splines that do
 //! not fit together are refused.
 
-mod common;
-
 use std::path::Path;
 
+use crate::common;
 use warpgait::pipeline;
 use warpgait::plan::Plan;
 use warpgait::scenario::load_text;
@@ -46,11 +45,11 @@ fn near(what: &str, t: f64, a: impl AsRef<[f64]>, b: impl AsRef<[f64]>, toleranc
 #[test]
 fn the_exact_motion_goes_through_the_samples() {
     let folder = tempfile::tempdir().unwrap();
-    for formulation in ["direct", "warped"] {
+    for formulation in ["direct", "warped", "hybrid"] {
         let path = folder.path().join("a.plan.npz");
         plan(formulation).write(&path).unwrap();
         let plan = Plan::read(&path).unwrap();
-        assert_eq!(plan.map.is_some(), formulation == "warped");
+        assert_eq!(plan.map.is_some(), formulation != "direct");
         let motion = plan.motion().unwrap();
         assert!((motion.duration() - 2.0).abs() < 1e-12 && motion.feet() == 4);
         assert!(plan.foot_contact.contains(&false));

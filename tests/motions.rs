@@ -1,11 +1,9 @@
 //! Whole motions: solved, checked by the code that reads plans alone, and as a person would expect them. Short horizons, so
 //! that all of them run in every build; their residuals are recorded in `tests/residuals.csv`.
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::solved;
+use crate::common::solved;
 use warpgait::check::{CheckReport, check};
 use warpgait::plan::Plan;
 use warpgait::planner::Motion;
@@ -59,7 +57,7 @@ fn medium_terrains_solve_hold_between_the_samples_and_stay_as_true_as_recorded()
     let mut table = String::from("terrain,formulation,figure,value\n");
     let mut worse = Vec::new();
     for (terrain, places, cells) in CASES {
-        for formulation in ["warped", "direct"] {
+        for formulation in ["warped", "direct", "hybrid"] {
             let robot = if places.contains("[robot]") { "" } else { "[robot]\nname = \"anymal_towr\"\n" };
             let text = format!(
                 "formulation = \"{formulation}\"\nhorizon = 4.0\n{robot}[terrain]\nkind = \"{terrain}\"\n{places}[map]\ncells = {cells}\n"
@@ -87,7 +85,7 @@ fn medium_terrains_solve_hold_between_the_samples_and_stay_as_true_as_recorded()
 
 #[test]
 fn a_standing_robot_has_constant_forces_and_does_not_move() {
-    for formulation in ["warped", "direct"] {
+    for formulation in ["warped", "direct", "hybrid"] {
         let text = format!(
             "formulation = \"{formulation}\"\nhorizon = 2.0\n[gait]\nkind = \"stand\"\n[terrain]\nkind = \"rippled\"\n\
              [start]\nposition = [0.1, 0.3]\nyaw = 0.4\n[goal]\nposition = [0.1, 0.3]\n[solver]\neffort = \"optimal\"\ntolerance = 1e-6\n"

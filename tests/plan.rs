@@ -1,20 +1,18 @@
 //! The plan file: what is written is what is read, and what is broken is refused by name.
 
-mod common;
-
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use crate::common;
 use warpgait::files::npz::NpzWriter;
-use warpgait::plan::{Plan, WarpedSamples};
+use warpgait::plan::{Plan, WarpedBase, WarpedSamples};
 use warpgait::warp::MapGrid;
 
 fn full_plan() -> Plan {
     let mut plan = common::standing();
     let n = plan.t.len();
     plan.warped = Some(WarpedSamples {
-        base_position: plan.base_position.clone(),
-        base_euler: vec![[0.1, 0.2, 0.3]; n],
+        base: Some(WarpedBase { position: plan.base_position.clone(), euler: vec![[0.1, 0.2, 0.3]; n] }),
         foot_position: plan.foot_position.clone(),
         foot_force: plan.foot_force.clone(),
     });

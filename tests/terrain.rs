@@ -1,18 +1,17 @@
-//! Terrains that must work: shapes, formulas, heightmaps in every PNG flavour and `.npy`.
+//! Terrains that must work: shapes, formulas, heightmaps in every PNG flavor and `.npy`.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use png::{BitDepth, ColorType};
-use warpgait::scenario::TerrainSpec;
+use warpgait::scenario;
 use warpgait::terrain::{Ground, build};
 
-fn spec(text: &str) -> TerrainSpec {
-    toml::from_str(text).unwrap()
-}
-
+/// The ground of a scenario whose `[terrain]` has these lines.
 fn ground(text: &str, folder: &Path) -> Ground {
-    build(&spec(text), folder).unwrap_or_else(|e| panic!("{text}: {e}"))
+    let whole = format!("[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n");
+    let loaded = scenario::load_text("s.toml", &whole, folder, &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
+    build(&loaded.scenario.terrain, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
 /// A PNG file; `palette` and `transparency` are the PLTE and tRNS chunks.
@@ -35,7 +34,7 @@ fn write_png(
     encoder.write_header().unwrap().write_image_data(data).unwrap();
 }
 
-/// Without smoothing: at the pixels the field is then the file.
+/// Without smoothing, so that the field equals the file at the pixels.
 const PLAIN: &str =
     "kind = \"heightmap\"\nfile = \"map\"\nspacing = 0.02\nheight_scale = 2.0\nsmoothing = 0.0\n";
 
@@ -89,7 +88,7 @@ fn shapes_follow_their_formulas_and_named_parameters() {
 }
 
 #[test]
-fn the_default_grid_fits_to_micrometres() {
+fn the_default_grid_fits_to_micrometers() {
     let ground = ground("kind = \"pit\"\nlevel = \"hard\"", Path::new(""));
     assert_eq!(ground.report.grid, [601, 601]);
     assert_eq!(ground.report.extent, [-3.0, 3.0, -3.0, 3.0]);
@@ -122,49 +121,49 @@ fn every_flavour_of_png_is_read() {
         assert_eq!(ground.report.holes_filled, 0, "{what}");
         assert!(ground.report.fit_error_max < 1e-12);
     };
-    let grey: Vec<u8> = (0..20).map(|i| 13 * i).collect();
-    let from8: Vec<f64> = grey.iter().map(|g| f64::from(*g) / 255.0).collect();
-    check("grey 8", (Grayscale, Eight), [None; 2], &grey, &from8);
+    let gray: Vec<u8> = (0..20).map(|i| 13 * i).collect();
+    let from8: Vec<f64> = gray.iter().map(|g| f64::from(*g) / 255.0).collect();
+    check("gray 8", (Grayscale, Eight), [None; 2], &gray, &from8);
 
     let wide: Vec<u16> = (0..20).map(|i| 3277 * i + 11).collect();
     let bytes: Vec<u8> = wide.iter().flat_map(|g| g.to_be_bytes()).collect();
     let from16: Vec<f64> = wide.iter().map(|g| f64::from(*g) / 65535.0).collect();
-    check("grey 16", (Grayscale, Sixteen), [None; 2], &bytes, &from16);
+    check("gray 16", (Grayscale, Sixteen), [None; 2], &bytes, &from16);
 
-    let with_alpha: Vec<u8> = grey.iter().flat_map(|g| [*g, 1]).collect();
-    check("grey + alpha 8", (GrayscaleAlpha, Eight), [None; 2], &with_alpha, &from8);
+    let with_alpha: Vec<u8> = gray.iter().flat_map(|g| [*g, 1]).collect();
+    check("gray + alpha 8", (GrayscaleAlpha, Eight), [None; 2], &with_alpha, &from8);
     let bytes: Vec<u8> = wide.iter().flat_map(|g| [g.to_be_bytes(), [0, 1]].concat()).collect();
-    check("grey + alpha 16", (GrayscaleAlpha, Sixteen), [None; 2], &bytes, &from16);
+    check("gray + alpha 16", (GrayscaleAlpha, Sixteen), [None; 2], &bytes, &from16);
 
     let luma =
         |r: u8, g: u8, b: u8| (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0;
-    let colour = |i: u8| [10 * i, 200 - 7 * i, 3 * i];
-    let of_colours: Vec<f64> = (0..20).map(colour).map(|[r, g, b]| luma(r, g, b)).collect();
-    let bytes: Vec<u8> = (0..20).flat_map(colour).collect();
-    check("colour 8", (Rgb, Eight), [None; 2], &bytes, &of_colours);
-    let bytes: Vec<u8> = (0..20).flat_map(|i| [colour(i).as_slice(), &[255]].concat()).collect();
-    check("colour + alpha 8", (Rgba, Eight), [None; 2], &bytes, &of_colours);
+    let color = |i: u8| [10 * i, 200 - 7 * i, 3 * i];
+    let of_colors: Vec<f64> = (0..20).map(color).map(|[r, g, b]| luma(r, g, b)).collect();
+    let bytes: Vec<u8> = (0..20).flat_map(color).collect();
+    check("color 8", (Rgb, Eight), [None; 2], &bytes, &of_colors);
+    let bytes: Vec<u8> = (0..20).flat_map(|i| [color(i).as_slice(), &[255]].concat()).collect();
+    check("color + alpha 8", (Rgba, Eight), [None; 2], &bytes, &of_colors);
     // v·257 in 16 bit is v/255.
-    let bytes: Vec<u8> = (0..20).flat_map(colour).flat_map(|v| [v, v]).collect();
-    check("colour 16", (Rgb, Sixteen), [None; 2], &bytes, &of_colours);
+    let bytes: Vec<u8> = (0..20).flat_map(color).flat_map(|v| [v, v]).collect();
+    check("color 16", (Rgb, Sixteen), [None; 2], &bytes, &of_colors);
     let bytes: Vec<u8> =
-        (0..20).flat_map(|i| [colour(i).as_slice(), &[9]].concat()).flat_map(|v| [v, v]).collect();
-    check("colour + alpha 16", (Rgba, Sixteen), [None; 2], &bytes, &of_colours);
+        (0..20).flat_map(|i| [color(i).as_slice(), &[9]].concat()).flat_map(|v| [v, v]).collect();
+    check("color + alpha 16", (Rgba, Sixteen), [None; 2], &bytes, &of_colors);
 
-    let palette: Vec<u8> = (0..20).flat_map(colour).collect();
+    let palette: Vec<u8> = (0..20).flat_map(color).collect();
     let indices: Vec<u8> = (0..20).collect();
-    check("palette 8", (Indexed, Eight), [Some(&palette), None], &indices, &of_colours);
+    check("palette 8", (Indexed, Eight), [Some(&palette), None], &indices, &of_colors);
     // Two pixels a byte, the rows of five padded to three bytes.
     let indices: Vec<u8> = [[0x01, 0x23, 0x40]; 4].concat();
-    let expected: Vec<f64> = (0..20).map(|i| of_colours[i % 5]).collect();
+    let expected: Vec<f64> = (0..20).map(|i| of_colors[i % 5]).collect();
     check("palette 4", (Indexed, Four), [Some(&palette[..15]), None], &indices, &expected);
 
     let expected: Vec<f64> = (0..20).map(|i| (i % 5) as f64 / 15.0).collect();
-    check("grey 4", (Grayscale, Four), [None; 2], &indices, &expected);
+    check("gray 4", (Grayscale, Four), [None; 2], &indices, &expected);
     let expected: Vec<f64> = (0..20).map(|i| [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 0.0][i % 5]).collect();
-    check("grey 2", (Grayscale, Two), [None; 2], &[[0b0001_1011, 0]; 4].concat(), &expected);
+    check("gray 2", (Grayscale, Two), [None; 2], &[[0b0001_1011, 0]; 4].concat(), &expected);
     let expected: Vec<f64> = (0..20).map(|i| [1.0, 0.0, 1.0, 1.0, 0.0][i % 5]).collect();
-    check("grey 1", (Grayscale, One), [None; 2], &[0b1011_0000; 4], &expected);
+    check("gray 1", (Grayscale, One), [None; 2], &[0b1011_0000; 4], &expected);
 }
 
 #[test]
@@ -173,28 +172,28 @@ fn transparent_pixels_are_holes_in_every_flavour() {
     use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgba};
     let folder = tempfile::tempdir().unwrap();
     let hole = 7;
-    let grey = |i: usize| if i == hole { 250 } else { 100 };
+    let gray = |i: usize| if i == hole { 250 } else { 100 };
     let alpha = |i: usize| if i == hole { 0 } else { 255 };
     let all = 0..20_usize;
     type Case = (&'static str, (ColorType, BitDepth), [Option<&'static [u8]>; 2], Vec<u8>);
     let cases: [Case; 5] = [
         (
-            "grey + alpha",
+            "gray + alpha",
             (GrayscaleAlpha, Eight),
             [None; 2],
-            all.clone().flat_map(|i| [grey(i), alpha(i)]).collect(),
+            all.clone().flat_map(|i| [gray(i), alpha(i)]).collect(),
         ),
         (
-            "colour + alpha",
+            "color + alpha",
             (Rgba, Eight),
             [None; 2],
-            all.clone().flat_map(|i| [grey(i), grey(i), grey(i), alpha(i)]).collect(),
+            all.clone().flat_map(|i| [gray(i), gray(i), gray(i), alpha(i)]).collect(),
         ),
         (
-            "grey + alpha 16",
+            "gray + alpha 16",
             (GrayscaleAlpha, Sixteen),
             [None; 2],
-            all.clone().flat_map(|i| [grey(i), grey(i), 0, alpha(i)]).collect(),
+            all.clone().flat_map(|i| [gray(i), gray(i), 0, alpha(i)]).collect(),
         ),
         (
             "palette with transparency",
@@ -202,7 +201,7 @@ fn transparent_pixels_are_holes_in_every_flavour() {
             [Some(&[100, 100, 100, 250, 250, 250]), Some(&[255, 0])],
             all.clone().map(|i| u8::from(i == hole)).collect(),
         ),
-        ("a transparent grey", (Grayscale, Eight), [None, Some(&[0, 250])], all.clone().map(grey).collect()),
+        ("a transparent gray", (Grayscale, Eight), [None, Some(&[0, 250])], all.clone().map(gray).collect()),
     ];
     for (what, format, chunks, data) in cases {
         write_png(&folder.path().join("map"), [5, 4], format, chunks, &data);
@@ -216,7 +215,7 @@ fn transparent_pixels_are_holes_in_every_flavour() {
 }
 
 #[test]
-fn the_first_row_of_an_image_is_the_largest_y_and_its_origin_the_centre() {
+fn the_first_row_of_an_image_is_the_largest_y_and_its_origin_is_the_center() {
     let folder = tempfile::tempdir().unwrap();
     let mut data = [0; 6 * 4];
     data[0] = 255; // top left: smallest x, largest y
@@ -292,8 +291,8 @@ fn arrays_are_read_in_every_type_and_order() {
         for (i, h) in pixels(&ground(PLAIN, folder.path())).into_iter().enumerate() {
             assert!((h - 2.0 * f64::from(value(i))).abs() < 1e-10, "file {k}, element {i}: {h}");
         }
-        let metres = ground(&PLAIN.replace("height_scale = 2.0\n", ""), folder.path());
-        assert!((pixels(&metres)[3] - f64::from(value(3))).abs() < 1e-10);
+        let meters = ground(&PLAIN.replace("height_scale = 2.0\n", ""), folder.path());
+        assert!((pixels(&meters)[3] - f64::from(value(3))).abs() < 1e-10);
     }
 }
 
@@ -324,6 +323,10 @@ fn arrays_keep_slopes_fill_nan_and_crop() {
     for (a, b) in cropped.report.extent.into_iter().zip([-0.5, 0.33, -0.2, 0.41]) {
         assert!((a - b).abs() < 1e-12);
     }
+    // Of the 7 x 5 cells without data, those with x from -0.2 to 0.04 and y from 0.24 to 0.4.
+    assert_eq!(cropped.report.holes_filled, 35);
+    let beside = ground(&format!("{text}extent = [0.0, 0.6, -0.6, 0.3]"), folder.path());
+    assert_eq!(beside.report.holes_filled, 2 * 2);
     for (x, y) in [(-0.5, -0.2), (0.33, 0.41), (0.1, 0.1)] {
         assert!((cropped.field.height(x, y) - whole.field.height(x, y)).abs() < 1e-6);
     }
@@ -332,8 +335,8 @@ fn arrays_keep_slopes_fill_nan_and_crop() {
 #[test]
 fn hashes_are_those_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
-    let grey = [9; 20];
-    write_png(&folder.path().join("map"), [5, 4], (ColorType::Grayscale, BitDepth::Eight), [None; 2], &grey);
+    let gray = [9; 20];
+    write_png(&folder.path().join("map"), [5, 4], (ColorType::Grayscale, BitDepth::Eight), [None; 2], &gray);
     let sum = std::process::Command::new("sha256sum").arg(folder.path().join("map")).output();
     let Ok(output) = sum else {
         println!("skipped: no sha256sum here");
@@ -355,7 +358,7 @@ fn the_rubble_is_walkable_ground() {
     assert!(report.height_range[1] - report.height_range[0] > 0.15);
     // Rough: blocks are still there after smoothing. But no cliff.
     assert!((0.5..2.5).contains(&report.largest_slope), "{}", report.largest_slope);
-    // Half a metre of flat ground at either end, on the line through the middle that a robot would take.
+    // Half a meter of flat ground at either end, on the line through the middle that a robot would take.
     for k in 0..=50 {
         for j in -10..=10 {
             for x in [x_min + 0.01 * f64::from(k), x_max - 0.01 * f64::from(k)] {

@@ -3,15 +3,23 @@
 use std::fs;
 use std::path::Path;
 
-use warpgait::Error;
-use warpgait::scenario::TerrainSpec;
-use warpgait::terrain::build;
+use warpgait::terrain::{Ground, build};
+use warpgait::{Error, scenario};
 
-/// The message with which a terrain is refused.
+/// The ground of a scenario whose `[terrain]` has these lines, from line 6 on.
+fn ground(text: &str, folder: &Path) -> warpgait::Result<Ground> {
+    let text = format!("[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n");
+    let loaded = scenario::load_text("s.toml", &text, folder, &[])?;
+    build(&loaded.scenario.terrain, folder).map_err(|e| loaded.locate(e))
+}
+
+/// The message with which a terrain is refused; it has file and line.
 fn refusal(text: &str, folder: &Path) -> String {
-    let spec: TerrainSpec = toml::from_str(text).unwrap();
-    match build(&spec, folder) {
-        Err(Error::Input(message)) => message,
+    match ground(text, folder) {
+        Err(Error::Input(message)) => {
+            assert!(message.starts_with("s.toml:"), "{text}: no file and line: {message}");
+            message
+        }
         Err(other) => panic!("{text}: not an input error: {other}"),
         Ok(_) => panic!("{text}: accepted"),
     }
@@ -42,14 +50,14 @@ fn png(columns: u32, rows: u32, data: &[u8], color: png::ColorType) -> Vec<u8> {
     bytes
 }
 
-fn grey(columns: u32, rows: u32) -> Vec<u8> {
+fn gray(columns: u32, rows: u32) -> Vec<u8> {
     let data: Vec<u8> = (0..columns * rows).map(|i| (i % 251) as u8).collect();
     png(columns, rows, &data, png::ColorType::Grayscale)
 }
 
-/// The signature and header of a PNG of that size, and nothing else: what a decoder sees before it allocates.
+/// Only the signature and header of a PNG of this size: what a decoder sees before it allocates.
 fn png_header(columns: u32, rows: u32) -> Vec<u8> {
-    let whole = grey(4, 4);
+    let whole = gray(4, 4);
     let mut bytes = whole[..33].to_vec();
     bytes[16..20].copy_from_slice(&columns.to_be_bytes());
     bytes[20..24].copy_from_slice(&rows.to_be_bytes());
@@ -83,7 +91,7 @@ fn keys_of_another_kind() {
     assert_refused(
         "kind = \"rippled\"\ndepth = 0.5",
         here,
-        &["terrain.depth", "\"rippled\"", "amplitude", "wavelength", "extent"],
+        &["s.toml:7: terrain.depth: not a key of kind = \"rippled\"", "amplitude, wavelength, extent"],
     );
     assert_refused("kind = \"flat\"\nlevel = \"easy\"", here, &["terrain.level", "extent, spacing"]);
     assert_refused("kind = \"conic\"\nwidth = 1.0", here, &["slope, radius, tip, foot"]);
@@ -95,10 +103,10 @@ fn keys_of_another_kind() {
 #[test]
 fn missing_keys() {
     let here = Path::new("");
-    assert_refused("kind = \"formula\"", here, &["terrain.expression is missing"]);
-    assert_refused("kind = \"heightmap\"\nspacing = 0.1", here, &["terrain.file is missing"]);
-    assert_refused("kind = \"heightmap\"\nfile = \"f\"", here, &["terrain.spacing is missing"]);
-    assert_file_refused(&grey(5, 5), "", &["terrain.height_scale is missing", "black to white"]);
+    assert_refused("kind = \"formula\"", here, &["s.toml:5: terrain.expression: missing"]);
+    assert_refused("kind = \"heightmap\"\nspacing = 0.1", here, &["s.toml:5: terrain.file: missing"]);
+    assert_refused("kind = \"heightmap\"\nfile = \"f\"", here, &["s.toml:5: terrain.spacing: missing"]);
+    assert_file_refused(&gray(5, 5), "", &["s.toml:5: terrain.height_scale: missing", "black to white"]);
 }
 
 #[test]
@@ -112,52 +120,61 @@ fn values_out_of_range() {
         "kind = \"conic\"\ntip = 0.0",
         "kind = \"hilly\"\nheight = 1e9",
         "kind = \"pit\"\nedge = 0.0",
+        "kind = \"flat\"\nspacing = -0.1",
+        "kind = \"flat\"\nspacing = nan",
+        "kind = \"flat\"\nspacing = 1e-5",
+        "kind = \"hilly\"\nextent = [0.0, nan, 0.0, 1.0]",
+        "kind = \"hilly\"\nextent = [-inf, inf, 0.0, 1.0]",
         "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.0",
         "kind = \"heightmap\"\nfile = \"f\"\nspacing = nan",
         "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\norigin = [0.0, inf]",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\nheight_scale = nan",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\nheight_scale = 1e9",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\nsmoothing = -0.1",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\nsmoothing = 50.0",
+        "kind = \"heightmap\"\nfile = \"f\"\nspacing = 0.1\nsmoothing = nan",
     ] {
-        assert_refused(text, here, &["out of range", "between"]);
+        assert_refused(text, here, &["given ", "allowed: a finite number from"]);
     }
-    for more in ["height_scale = nan", "height_scale = 1e9"] {
-        assert_file_refused(&grey(5, 5), more, &["terrain.height_scale", "out of range"]);
-    }
-    for more in ["smoothing = -0.1", "smoothing = 50.0", "smoothing = nan"] {
-        let more = format!("height_scale = 1.0\n{more}");
-        assert_file_refused(&grey(5, 5), &more, &["terrain.smoothing", "out of range"]);
-    }
+    assert_refused(&format!("{MAP}smoothing = 3.0"), here, &["terrain.smoothing: given 3", "at most 2 m"]);
 }
 
 #[test]
 fn extents_and_grids() {
     let here = Path::new("");
-    for extent in
-        ["[1.0, 1.0, 0.0, 1.0]", "[1.0, -1.0, 0.0, 1.0]", "[0.0, nan, 0.0, 1.0]", "[-inf, inf, 0.0, 1.0]"]
-    {
-        assert_refused(&format!("kind = \"hilly\"\nextent = {extent}"), here, &["extent", "x_min < x_max"]);
+    for extent in ["[1.0, 1.0, 0.0, 1.0]", "[1.0, -1.0, 0.0, 1.0]", "[0.0, 9.0, 0.0, 0.1]"] {
+        assert_refused(
+            &format!("kind = \"hilly\"\nextent = {extent}"),
+            here,
+            &["s.toml:7: terrain.extent: given", "each max at least 0.5 m above its min"],
+        );
     }
-    for spacing in ["0.0", "-0.1", "nan", "inf"] {
-        assert_refused(&format!("kind = \"flat\"\nspacing = {spacing}"), here, &["spacing", "positive"]);
-    }
-    assert_refused("kind = \"flat\"\nspacing = 1e-5", here, &["nodes", "spacing of at least"]);
+    assert_refused(
+        "kind = \"flat\"\nspacing = 0.001",
+        here,
+        &["s.toml:7: terrain.spacing", "nodes", "at least"],
+    );
     assert_refused("kind = \"flat\"\nextent = [-1e5, 1e5, -1e5, 1e5]", here, &["nodes"]);
-    let more = "height_scale = 1.0\nextent = [-9.0, 0.0, 0.0, 0.1]";
-    assert_file_refused(&grey(9, 9), more, &["reaches beyond", "-0.160, 0.160"]);
+    let more = "height_scale = 1.0\nextent = [-9.0, 0.0, -0.4, 0.4]";
+    assert_file_refused(
+        &gray(19, 19),
+        more,
+        &["s.toml:10: terrain.extent: ", "reaches beyond", "-0.360, 0.360"],
+    );
     let more = "height_scale = 1.0\nextent = [0.1, 0.0, 0.0, 0.1]";
-    assert_file_refused(&grey(9, 9), more, &["not a rectangle"]);
-    let more = "height_scale = 1.0\nextent = [nan, 0.1, 0.0, 0.1]";
-    assert_file_refused(&grey(9, 9), more, &["extent"]);
+    assert_file_refused(&gray(9, 9), more, &["terrain.extent: given"]);
 }
 
 #[test]
 fn expressions() {
     let here = Path::new("");
     let cases: [(&str, &[&str]); 6] = [
-        ("0.1*sin(x", &["character 10", "')'"]),
+        ("0.1*sin(x", &["s.toml:7: terrain.expression", "character 10", "')'"]),
         ("z + x", &["\"z\" is unknown", "x and y"]),
         ("0.1/x", &["inf", "x = 0.0000, y = -3.0000"]),
         ("sqrt(x)", &["NaN", "x = -3.0000"]),
         ("1e6*x", &["within"]),
-        ("", &["missing"]),
+        ("", &["ends too early"]),
     ];
     for (expression, parts) in cases {
         assert_refused(&format!("kind = \"formula\"\nexpression = \"{expression}\""), here, parts);
@@ -170,33 +187,32 @@ fn expressions() {
 #[test]
 fn files_that_are_no_heightmaps() {
     let folder = tempfile::tempdir().unwrap();
-    assert_refused(MAP, folder.path(), &["\"f\"", "looked for", "scenario's folder"]);
+    assert_refused(MAP, folder.path(), &["s.toml:7: terrain.file: \"f\"", "looked for", "scenario's folder"]);
     fs::create_dir(folder.path().join("f")).unwrap();
     assert_refused(MAP, folder.path(), &["not a file"]);
     let scale = "height_scale = 1.0";
-    assert_file_refused(b"", scale, &["\"f\"", "neither a PNG"]);
-    assert_file_refused(b"<svg/>", scale, &["neither a PNG"]);
-    assert_file_refused(&grey(9, 9)[..8], scale, &["not a sound PNG"]);
+    assert_file_refused(b"", scale, &["\"f\"", "not a format that can be read: a PNG image, an .npy array"]);
+    assert_file_refused(b"<svg/>", scale, &["not a format that can be read: a PNG image, an .npy array"]);
+    assert_file_refused(&gray(9, 9)[..8], scale, &["not a valid PNG"]);
 }
 
 #[test]
 fn broken_images_at_every_length_and_byte() {
-    let whole = grey(23, 17);
+    let whole = gray(23, 17);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("f");
     let text = format!("{MAP}height_scale = 1.0");
-    let spec: TerrainSpec = toml::from_str(&text).unwrap();
     let data_end = whole.len() - 12; // the end chunk
     for length in (8..data_end - 4).step_by(3) {
         fs::write(&file, &whole[..length]).unwrap();
-        assert!(refusal(&text, folder.path()).contains("not a sound PNG"), "{length} bytes");
+        assert!(refusal(&text, folder.path()).contains("not a valid PNG"), "{length} bytes");
     }
     for i in 8..whole.len() {
         let mut bytes = whole.clone();
         bytes[i] ^= 0x55;
         fs::write(&file, &bytes).unwrap();
         // Some bytes do not matter; none may panic.
-        let _ = build(&spec, folder.path());
+        let _ = ground(&text, folder.path());
     }
 }
 
@@ -205,9 +221,9 @@ fn image_sizes_are_judged_from_the_header() {
     let scale = "height_scale = 1.0";
     assert_file_refused(&png_header(20_000, 20_000), scale, &["20000 x 20000", "too many"]);
     assert_file_refused(&png_header(u32::MAX >> 1, u32::MAX >> 1), scale, &["too many"]);
-    assert_file_refused(&grey(1, 1), scale, &["1 x 1", "at least 4 x 4"]);
-    assert_file_refused(&grey(100, 3), scale, &["100 x 3", "at least 4 x 4"]);
-    assert_file_refused(&png_header(0, 4), scale, &["not a sound PNG"]);
+    assert_file_refused(&gray(1, 1), scale, &["1 x 1", "at least 4 x 4"]);
+    assert_file_refused(&gray(100, 3), scale, &["100 x 3", "at least 4 x 4"]);
+    assert_file_refused(&png_header(0, 4), scale, &["not a valid PNG"]);
 }
 
 #[test]
@@ -219,21 +235,21 @@ fn images_without_data() {
 
 #[test]
 fn arrays() {
-    let sound = floats((0..25).map(f64::from));
-    assert_file_refused(&npy("<f8", "(25,)", &sound), "", &["[25]", "two dimensions"]);
-    assert_file_refused(&npy("<f8", "(1, 5, 5)", &sound), "", &["two dimensions"]);
-    assert_file_refused(&npy("<f8", "()", &sound), "", &["two dimensions"]);
-    assert_file_refused(&npy("<c16", "(5, 5)", &sound.repeat(2)), "", &["c16", "floats"]);
-    assert_file_refused(&npy("<U2", "(5, 5)", &sound), "", &["floats"]);
-    assert_file_refused(&npy("|O", "(5, 5)", &sound), "", &["floats"]);
-    assert_file_refused(&npy("<f8", "(5, 5)", &sound[..190]), "", &["not a sound .npy"]);
-    assert_file_refused(&npy("<f8", "(3, 5)", &sound), "", &["at least 4 x 4"]);
+    let valid = floats((0..25).map(f64::from));
+    assert_file_refused(&npy("<f8", "(25,)", &valid), "", &["[25]", "two dimensions"]);
+    assert_file_refused(&npy("<f8", "(1, 5, 5)", &valid), "", &["two dimensions"]);
+    assert_file_refused(&npy("<f8", "()", &valid), "", &["two dimensions"]);
+    assert_file_refused(&npy("<c16", "(5, 5)", &valid.repeat(2)), "", &["c16", "floats"]);
+    assert_file_refused(&npy("<U2", "(5, 5)", &valid), "", &["floats"]);
+    assert_file_refused(&npy("|O", "(5, 5)", &valid), "", &["floats"]);
+    assert_file_refused(&npy("<f8", "(5, 5)", &valid[..190]), "", &["not a valid .npy"]);
+    assert_file_refused(&npy("<f8", "(3, 5)", &valid), "", &["at least 4 x 4"]);
     assert_file_refused(&npy("<f8", "(0, 0)", &[]), "", &["at least 4 x 4"]);
     assert_file_refused(&npy("<f8", "(20000, 20000)", &[]), "", &["too many"]);
     assert_file_refused(&npy("<f8", "(9000000000000000000, 9000000000000000000)", &[]), "", &["too many"]);
-    assert_file_refused(b"\x93NUMPY\x01\x00", "", &["not a sound .npy"]);
-    assert_file_refused(b"\x93NUMPY\x02\x00\xff\xff\xff\xff", "", &["not a sound .npy"]);
-    assert_file_refused(&npy("<f8", "(5, 5", &sound), "", &["not a sound .npy"]);
+    assert_file_refused(b"\x93NUMPY\x01\x00", "", &["not a valid .npy"]);
+    assert_file_refused(b"\x93NUMPY\x02\x00\xff\xff\xff\xff", "", &["not a valid .npy"]);
+    assert_file_refused(&npy("<f8", "(5, 5", &valid), "", &["not a valid .npy"]);
     let with = |v: f64| npy("<f8", "(5, 5)", &floats((0..25).map(|i| if i == 13 { v } else { 0.1 })));
     assert_file_refused(&with(f64::INFINITY), "", &["element [2, 3] is inf"]);
     assert_file_refused(&with(1e5), "", &["height_scale"]);

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Makes rubble.png: a made-up scan of a rubble field with the troubles of a real one.
+"""Makes rubble.png: an artificial scan of a rubble field, with the defects of a real scan.
 
-5.985 m x 3.99 m at 0.035 m a pixel, 16-bit grey + alpha, 0.40 m from black to white (terrain.spacing = 0.035,
-terrain.height_scale = 0.40). A step 9 cm high across the middle, tilted blocks 4 to 15 cm high with sharp edges, gravel,
-3 mm of sensor noise, and no data (alpha 0) in the shadows that blocks throw for a scanner standing at the left, and in
-stray pixels. The first and the last 0.8 m are flat but for the noise. The same file every time.
+5.985 m x 3.99 m at 0.035 m per pixel, 16-bit gray + alpha, 0.40 m from black to white (terrain.spacing = 0.035,
+terrain.height_scale = 0.40). The field has a step 9 cm high across the middle, tilted blocks 4 to 15 cm high with sharp
+edges, and gravel. The scan has 3 mm of sensor noise, and no data (alpha 0) in the shadows that the blocks cast for a
+scanner at the left and in a few stray pixels. The first and the last 0.8 m are flat except for the noise. The file is the
+same every time.
 
     python3 scenarios/data/make_rubble.py            # writes rubble.png beside this script
 """
@@ -15,32 +16,41 @@ import struct
 import zlib
 from pathlib import Path
 
-SPACING = 0.035  # m a pixel
+SPACING = 0.035  # m per pixel
 COLUMNS, ROWS = 172, 115  # x, y
 FULL_SCALE = 0.40  # m from black to white
-BASE = 0.08  # m, grey level of the low ground, so that nothing is clipped
-MARGIN = 0.80  # m free of blocks at either end
-STEP_AT, STEP_HEIGHT = 0.35, 0.09  # m, the kerb: x of its edge, height
+BASE = 0.08  # m, added to the low ground so that no height is clipped
+MARGIN = 0.80  # m without blocks at either end
+BLOCKS, TRIES = 70, 4000  # number of blocks, and of random places that are tried for them
+LEAST_DISTANCE = 0.30  # m between centers of blocks
+HIGHEST_BLOCK = 0.15  # m
+GRAVEL, GRAVEL_PITCH = 0.006, 3  # m, standard deviation of the bumps; pixels between the independent ones
+GRAVEL_FADE = 0.2  # m over which the gravel fades out at the margins
+STEP_AT, STEP_HEIGHT = 0.35, 0.09  # m, the curb: x of its edge, height
 NOISE = 0.003  # m, standard deviation of the sensor
-SCANNER = (-3.6, 0.0, 2.6)  # x, y, z of the scanner over the low ground, m
+SCANNER = (-3.6, 0.0, 2.6)  # m, x, y and z of the scanner above the low ground
+SHADOW = 1.2  # m, longer than any shadow
+OCCLUSION = 0.005  # m: ground that rises above the line of sight by more hides a pixel
+LOST = 0.004  # fraction of stray pixels without data
+WHITE = 65535  # largest 16-bit value
 
 
-def kerb(x: float, y: float) -> float:
-    """Height of the ground under the blocks, m: low, a broken kerb, a terrace, a ramp down to the far margin."""
+def curb(x: float, y: float) -> float:
+    """Height of the ground under the blocks, m: low ground, a broken curb, a terrace, and a ramp down to the far margin."""
     edge = STEP_AT + 0.06 * math.sin(2.1 * y) + 0.03 * math.sin(7.3 * y + 1.0)
     ramp = min(1.0, max(0.0, (2.15 - x) / 0.9))
     return STEP_HEIGHT * ramp if x > edge else 0.0
 
 
 def make_blocks(rng: random.Random) -> list[dict]:
-    """Blocks as rectangles with a tilted top, spread so that no two centres are closer than 0.30 m."""
+    """Rectangles with a tilted top, whose centers are at least LEAST_DISTANCE apart."""
     half_x = 0.5 * SPACING * (COLUMNS - 1)
     half_y = 0.5 * SPACING * (ROWS - 1)
     blocks: list[dict] = []
-    for _ in range(4000):
+    for _ in range(TRIES):
         x = rng.uniform(-half_x + MARGIN + 0.25, half_x - MARGIN - 0.25)
         y = rng.uniform(-half_y, half_y)
-        if any(math.hypot(x - b["x"], y - b["y"]) < 0.30 for b in blocks):
+        if any(math.hypot(x - b["x"], y - b["y"]) < LEAST_DISTANCE for b in blocks):
             continue
         blocks.append(
             {
@@ -49,29 +59,29 @@ def make_blocks(rng: random.Random) -> list[dict]:
                 "length": rng.uniform(0.10, 0.24),  # half sides, m
                 "width": rng.uniform(0.06, 0.13),
                 "turn": rng.uniform(0.0, math.pi),
-                "height": 0.04 + 0.11 * rng.random() ** 2,  # mostly low, up to 0.15 m
+                "height": 0.04 + 0.11 * rng.random() ** 2,  # mostly low
                 "tilt": (rng.uniform(-0.15, 0.15), rng.uniform(-0.15, 0.15)),
             }
         )
-        if len(blocks) == 70:
+        if len(blocks) == BLOCKS:
             break
     return blocks
 
 
 def block_top(block: dict, x: float, y: float) -> float:
-    """Height of the block's top over the ground at x, y; 0 beside it."""
+    """Height of the block's top above the ground at x, y, m; 0 beside it."""
     dx, dy = x - block["x"], y - block["y"]
     c, s = math.cos(block["turn"]), math.sin(block["turn"])
     u, v = c * dx + s * dy, c * dy - s * dx
     if abs(u) > block["length"] or abs(v) > block["width"]:
         return 0.0
-    return max(0.0, min(0.15, block["height"] + block["tilt"][0] * u + block["tilt"][1] * v))
+    return max(0.0, min(HIGHEST_BLOCK, block["height"] + block["tilt"][0] * u + block["tilt"][1] * v))
 
 
 def gravel(rng: random.Random) -> list[list[float]]:
-    """Bumps of a few millimetres that are correlated over about 0.1 m: random values on a coarse grid, bilinear."""
-    pitch = 3
-    coarse = [[rng.gauss(0.0, 0.006) for _ in range(COLUMNS // pitch + 2)] for _ in range(ROWS // pitch + 2)]
+    """Bumps of a few millimeters, correlated over about 0.1 m: random values on a coarse grid, interpolated bilinearly."""
+    pitch = GRAVEL_PITCH
+    coarse = [[rng.gauss(0.0, GRAVEL) for _ in range(COLUMNS // pitch + 2)] for _ in range(ROWS // pitch + 2)]
     field = []
     for row in range(ROWS):
         r, t = divmod(row, pitch)
@@ -88,40 +98,41 @@ def gravel(rng: random.Random) -> list[list[float]]:
 
 
 def position(column: int, row: int) -> tuple[float, float]:
-    """x, y of a pixel's centre, m; row 0 is the largest y."""
+    """x, y of a pixel's center, m; row 0 has the largest y."""
     return SPACING * (column - 0.5 * (COLUMNS - 1)), -SPACING * (row - 0.5 * (ROWS - 1))
 
 
 def is_hidden(heights: list[list[float]], column: int, row: int) -> bool:
-    """Whether something stands between the pixel and the scanner."""
+    """Whether the ground hides the pixel from the scanner."""
     x, y = position(column, row)
     z = heights[row][column]
     dx, dy, dz = SCANNER[0] - x, SCANNER[1] - y, SCANNER[2] - z
     distance = math.hypot(dx, dy)
-    for k in range(1, int(1.2 / SPACING)):  # nothing here throws a longer shadow
-        share = k * SPACING / distance
-        c = round((x + share * dx) / SPACING + 0.5 * (COLUMNS - 1))
-        r = round(-(y + share * dy) / SPACING + 0.5 * (ROWS - 1))
+    for k in range(1, int(SHADOW / SPACING)):
+        fraction = k * SPACING / distance
+        c = round((x + fraction * dx) / SPACING + 0.5 * (COLUMNS - 1))
+        r = round(-(y + fraction * dy) / SPACING + 0.5 * (ROWS - 1))
         if not (0 <= c < COLUMNS and 0 <= r < ROWS):
             return False
-        if heights[r][c] > z + share * dz + 0.005:
+        if heights[r][c] > z + fraction * dz + OCCLUSION:
             return True
     return False
 
 
-def write_png(path: Path, grey_alpha: list[list[tuple[int, int]]]) -> None:
-    """A 16-bit grey + alpha PNG without filters."""
+def write_png(path: Path, gray_alpha: list[list[tuple[int, int]]]) -> None:
+    """A 16-bit gray + alpha PNG without filters."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    lines = b"".join(b"\0" + b"".join(struct.pack(">HH", g, a) for g, a in line) for line in grey_alpha)
-    header = struct.pack(">IIBBBBB", len(grey_alpha[0]), len(grey_alpha), 16, 4, 0, 0, 0)
+    lines = b"".join(b"\0" + b"".join(struct.pack(">HH", g, a) for g, a in line) for line in gray_alpha)
+    header = struct.pack(">IIBBBBB", len(gray_alpha[0]), len(gray_alpha), 16, 4, 0, 0, 0)
     body = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines, 9)) + chunk(b"IEND", b"")
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + body)
 
 
 def main() -> None:
+    """Write rubble.png beside this script."""
     rng = random.Random(2022)
     blocks = make_blocks(rng)
     bumps = gravel(rng)
@@ -131,9 +142,9 @@ def main() -> None:
         line = []
         for column in range(COLUMNS):
             x, y = position(column, row)
-            inside = min(1.0, max(0.0, (half_x - MARGIN - abs(x)) / 0.2))  # gravel ends softly at the margins
+            inside = min(1.0, max(0.0, (half_x - MARGIN - abs(x)) / GRAVEL_FADE))
             top = max(block_top(block, x, y) for block in blocks)
-            line.append(kerb(x, y) + top + inside * bumps[row][column])
+            line.append(curb(x, y) + top + inside * bumps[row][column])
         heights.append(line)
 
     pixels = []
@@ -141,9 +152,9 @@ def main() -> None:
         line = []
         for column in range(COLUMNS):
             measured = BASE + heights[row][column] + rng.gauss(0.0, NOISE)
-            lost = is_hidden(heights, column, row) or rng.random() < 0.004
-            grey = round(65535 * min(1.0, max(0.0, measured / FULL_SCALE)))
-            line.append((0, 0) if lost else (grey, 65535))
+            lost = is_hidden(heights, column, row) or rng.random() < LOST
+            gray = round(WHITE * min(1.0, max(0.0, measured / FULL_SCALE)))
+            line.append((0, 0) if lost else (gray, WHITE))
         pixels.append(line)
     path = Path(__file__).with_name("rubble.png")
     write_png(path, pixels)

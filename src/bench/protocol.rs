@@ -349,16 +349,15 @@ mod tests {
                 let names: std::collections::BTreeSet<&str> = cases.iter().map(|c| c.name.as_str()).collect();
                 assert_eq!(names.len(), cases.len(), "{}", bench.name());
                 for case in &cases {
-                    let scenario = scenario::parse(&case.name, &case.scenario).unwrap();
-                    assert!(terrain::build(&coarse(scenario.terrain), ".".as_ref()).is_ok(), "{}", case.name);
+                    // A coarse grid is built quickly.
+                    let coarse = ["terrain.spacing=0.2".into()];
+                    let loaded =
+                        scenario::load_text(&case.name, &case.scenario, ".".as_ref(), &coarse).unwrap();
+                    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir);
+                    assert!(ground.is_ok(), "{}", case.name);
                 }
             }
         }
-    }
-
-    /// The same ground on a coarse grid, which is built fast.
-    fn coarse(spec: crate::scenario::TerrainSpec) -> crate::scenario::TerrainSpec {
-        crate::scenario::TerrainSpec { spacing: Some(0.2), ..spec }
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! Feet and forces: on the ground in stance, over it in swing, forces within their cones and limits.
+//! Feet and forces: on the ground in stance, above it in swing, forces within their cones and limits.
 
-use super::{Finding, Residuals, Subject, Worst, dot, laws, norm, scale, sub};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst};
+use super::vector::{dot, norm, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     feet(s, findings, residuals);
@@ -9,7 +11,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     footholds(s, findings);
 }
 
-/// Height of a foot over the ground, m.
+/// Height of a foot above the ground, m.
 fn height_over_ground(s: &Subject, n: usize, e: usize) -> f64 {
     let [x, y, z] = s.foot_position(n, e);
     z - s.ground.height(x, y)
@@ -67,7 +69,7 @@ fn swings(s: &Subject, findings: &mut Vec<Finding>) {
 /// The cone of Eq. 5 with the terrain's own normals, limits along the normal, nothing in swing.
 fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let motion = &s.scenario.motion;
-    let share = 100.0 / s.weight;
+    let percent = 100.0 / s.weight;
     let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
         [Worst::default(); 6];
     residuals.friction = vec![0.0; s.samples];
@@ -76,22 +78,22 @@ fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
         let [x, y, _] = s.foot_position(n, e);
         let normal = s.ground.normal(x, y);
         let stated = s.plan.foot_normal[n * s.feet + e];
-        // The chord between two unit vectors tells small angles better than the cosine.
+        // For small angles the chord between two unit vectors is more accurate than the cosine.
         normals.meet((2.0 * (0.5 * norm(sub(normal, stated))).min(1.0).asin()).to_degrees(), n, Some(e));
         if !s.in_contact(n, e) {
-            swing.meet(share * norm(force), n, Some(e));
+            swing.meet(percent * norm(force), n, Some(e));
             continue;
         }
         let along = dot(force, normal);
         let across = norm(sub(force, scale(along, normal)));
-        push_over.meet(share * along - 100.0 * motion.force_limit, n, Some(e));
+        push_over.meet(percent * along - 100.0 * motion.force_limit, n, Some(e));
         if s.plan.foot_adhesive[e] {
-            pull_over.meet(-share * along - 100.0 * motion.pull_limit, n, Some(e));
+            pull_over.meet(-percent * along - 100.0 * motion.pull_limit, n, Some(e));
         } else {
-            let excess = share * (across - s.plan.meta.robot.friction * along);
+            let excess = percent * (across - s.plan.meta.robot.friction * along);
             friction.meet(excess, n, Some(e));
             residuals.friction[n] = residuals.friction[n].max(excess);
-            pull.meet(-share * along, n, Some(e));
+            pull.meet(-percent * along, n, Some(e));
         }
     }
     findings.push((laws::NORMAL, normals));

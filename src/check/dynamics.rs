@@ -1,15 +1,15 @@
-//! The laws of motion, and whether the plan's derivatives are derivatives.
+//! The laws of motion (Eq. 2), and whether the plan's velocities and accelerations are derivatives of its positions.
 //!
 //! Each law is evaluated twice: at every sample with the plan's own accelerations, and from positions and orientations
 //! alone. A second difference equals the acceleration averaged with a hat of half width h,
 //! p(t−h) − 2p(t) + p(t+h) = h² ∫ hat(s) p̈(t+s) ds, so that the law holds for it with the forces averaged by the same
 //! hat; Simpson's rule (1, 4, 1)/6 does this to fourth order. The larger residual counts.
 
-use super::{
-    Finding, Residuals, Subject, Worst, add, cross, dot, laws, norm, rms, rotate, rotate_back, scale, sub,
-};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst, rms};
+use super::vector::{add, cross, dot, norm, rotate, rotate_back, scale, sub};
 
-/// Length that makes a torque comparable with a weight, m.
+/// Lever arm by which torques are compared with the weight, m.
 const LEVER: f64 = 0.3;
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
@@ -24,7 +24,12 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     quaternions(s, findings);
 }
 
-fn report(findings: &mut Vec<Finding>, mean: &'static laws::Law, most: &'static laws::Law, values: &[f64]) {
+fn report(
+    findings: &mut Vec<Finding>,
+    mean: &'static laws::CheckedLaw,
+    most: &'static laws::CheckedLaw,
+    values: &[f64],
+) {
     let mut worst = Worst::default();
     for (n, value) in values.iter().enumerate() {
         worst.meet(*value, n, None);
@@ -70,7 +75,7 @@ fn newton(s: &Subject, forces: &[[f64; 3]]) -> Vec<f64> {
 /// ‖L̇ − Σ(pᵢ − p) × fᵢ‖ by sample, % of m g · 0.3 m, with L = R I Rᵀ ω.
 fn euler(s: &Subject, torques: &[[f64; 3]]) -> Vec<f64> {
     let plan = s.plan;
-    // From orientations alone: the mean angular velocity between two samples, and the inertia half way.
+    // From orientations alone: the mean angular velocity between two samples, and the inertia halfway.
     let momenta: Vec<[f64; 3]> = plan
         .base_quaternion_wxyz
         .windows(2)
@@ -136,7 +141,7 @@ fn consistency(s: &Subject, findings: &mut Vec<Finding>) {
         .map(|n| {
             let acceleration =
                 sub(difference(&plan.base_linear_velocity, n), hat(&plan.base_linear_acceleration, n));
-            // A velocity error that lasts a tenth of a second is one of acceleration, so that one figure serves.
+            // A velocity error over a tenth of a second counts as an error of acceleration, so that one figure covers both.
             let velocity = sub(difference(&plan.base_position, n), hat(&plan.base_linear_velocity, n));
             100.0 * norm(acceleration).max(norm(velocity) / 0.1) / gravity
         })

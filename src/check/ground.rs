@@ -5,7 +5,7 @@
 use crate::plan::GroundGrid;
 
 /// h(x, y) on the plan's grid.
-pub struct Ground {
+pub struct PlanGround {
     origin: [f64; 2],
     spacing: [f64; 2],
     /// B-spline coefficients, one more on every side than samples: `coefficients[row * columns + column]`.
@@ -14,7 +14,7 @@ pub struct Ground {
     columns: usize,
 }
 
-impl Ground {
+impl PlanGround {
     /// Fits the spline: along the rows, then along the columns.
     pub fn new(grid: &GroundGrid) -> Self {
         let (rows, columns) = (grid.rows + 2, grid.columns + 2);
@@ -39,7 +39,7 @@ impl Ground {
         [self.origin[0], end(0, self.columns), self.origin[1], end(1, self.rows)]
     }
 
-    /// Whether the grid reaches to this place.
+    /// Whether a place lies on the grid.
     pub fn covers(&self, x: f64, y: f64) -> bool {
         let [x_min, x_max, y_min, y_max] = self.extent();
         let slack = 1e-9;
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn cubics_are_reproduced() {
         let h = |x: f64, y: f64| 0.3 + x - 0.5 * y + x * x * y - 0.2 * x * x * x * y * y * y;
-        let ground = Ground::new(&sampled(9, 0.25, h));
+        let ground = PlanGround::new(&sampled(9, 0.25, h));
         for (x, y) in [(-1.0, -1.0), (0.13, -0.61), (0.99, 0.37), (1.0, 1.0), (-0.97, 0.95)] {
             assert!((ground.height(x, y) - h(x, y)).abs() < 1e-12);
             let d = 1e-6;
@@ -156,9 +156,9 @@ mod tests {
     }
 
     #[test]
-    fn ripples_are_met_to_a_hundredth_of_a_millimetre() {
+    fn ripples_are_met_to_a_hundredth_of_a_millimeter() {
         let h = |x: f64, y: f64| 0.25 * (2.618 * x).sin() * (2.618 * y).sin();
-        let ground = Ground::new(&sampled(51, 0.04, h));
+        let ground = PlanGround::new(&sampled(51, 0.04, h));
         let worst = (0..2000)
             .map(|i| (-1.0 + (i * 37 % 2000) as f64 / 1000.0, -1.0 + (i * 91 % 2000) as f64 / 1000.0))
             .map(|(x, y)| (ground.height(x, y) - h(x, y)).abs())
@@ -176,7 +176,7 @@ mod tests {
             height: vec![0.0, 1.0, 2.0, 1.0, 2.0, 3.0],
             raw: None,
         };
-        let ground = Ground::new(&grid);
+        let ground = PlanGround::new(&grid);
         assert!((ground.height(0.5, 0.5) - 1.0).abs() < 1e-12);
         assert!((ground.height(1.7, 0.1) - 1.8).abs() < 1e-12);
         assert!(ground.covers(2.0, 1.0) && !ground.covers(2.1, 0.5));

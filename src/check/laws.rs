@@ -3,37 +3,37 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::scenario::closest_word;
+use crate::input::closest;
 use crate::{Error, Result};
 
 /// One law.
 #[derive(Debug, PartialEq)]
-pub struct Law {
+pub struct CheckedLaw {
     /// As in `checks` of a plan and in a file of limits.
     pub name: &'static str,
     /// Unit of its value.
     pub unit: &'static str,
-    /// Largest value allowed by default; none for what is only measured.
+    /// Largest value allowed by default; none if it is only reported.
     pub limit: Option<f64>,
     /// Limit under `--strict`, where that differs.
     pub strict: Option<f64>,
-    /// In words.
+    /// What it means.
     pub meaning: &'static str,
 }
 
 macro_rules! laws {
     ($($constant:ident = $name:literal, $unit:literal, $limit:expr, $strict:expr, $meaning:literal;)*) => {
-        $(pub(super) const $constant: &Law =
-            &Law { name: $name, unit: $unit, limit: $limit, strict: $strict, meaning: $meaning };)*
+        $(pub(super) const $constant: &CheckedLaw =
+            &CheckedLaw { name: $name, unit: $unit, limit: $limit, strict: $strict, meaning: $meaning };)*
         /// All laws, in the order of the report.
-        pub const LAWS: &[&Law] = &[$($constant),*];
+        pub const LAWS: &[&CheckedLaw] = &[$($constant),*];
     };
 }
 
 laws! {
     NEWTON_RMS = "newton_rms", "% m g", Some(0.5), None, "Newton's law, m p̈ = Σf + m g, root mean square";
     NEWTON_MAX = "newton_max", "% m g", Some(3.0), None, "Newton's law, worst sample";
-    EULER_RMS = "euler_rms", "% m g·0.3 m", Some(0.5), None, "Euler's law about the centre of mass, root mean square";
+    EULER_RMS = "euler_rms", "% m g·0.3 m", Some(0.5), None, "Euler's law about the center of mass, root mean square";
     EULER_MAX = "euler_max", "% m g·0.3 m", Some(3.0), None, "Euler's law, worst sample";
     LINEAR_CONSISTENCY = "linear_consistency", "% g", Some(1.0), None,
         "base velocity and acceleration are the derivatives of the position, root mean square";
@@ -44,7 +44,7 @@ laws! {
     STANCE_GAP = "stance_gap", "mm", Some(1.0), None, "a standing foot is on the ground";
     STANCE_SLIP = "stance_slip", "mm", Some(0.1), None, "a standing foot does not move";
     SWING_PENETRATION = "swing_penetration", "mm", Some(0.1), None,
-        "a swinging foot stays over the ground (allowance for rounding: 0.1 mm)";
+        "a swinging foot stays above the ground (allowance for rounding: 0.1 mm)";
     SWING_APEX = "swing_apex_shortfall", "mm", Some(0.2), None,
         "a swing rises to motion.swing_clearance (allowance for the sampling: 0.2 mm)";
     NORMAL = "normal", "°", Some(0.5), None, "the plan's normals are those of its terrain";
@@ -52,34 +52,34 @@ laws! {
     PULL = "pull", "% m g", Some(0.05), None, "pull of a foot that is not adhesive (allowance for rounding: 0.05 %)";
     FORCE_LIMIT = "force_limit", "% m g", Some(0.5), None, "normal force beyond motion.force_limit";
     PULL_LIMIT = "pull_limit", "% m g", Some(0.5), None, "pull of an adhesive foot beyond motion.pull_limit";
-    SWING_FORCE = "swing_force", "% m g", Some(1e-4), None, "a swinging foot bears nothing";
+    SWING_FORCE = "swing_force", "% m g", Some(1e-4), None, "a swinging foot exerts no force";
     REACH = "reach", "mm", Some(1.0), None, "distance of a foot beyond its reach box";
     BASE_CLEARANCE = "base_clearance_shortfall", "mm", Some(0.2), None,
         "the torso's underside keeps motion.base_clearance from the ground (allowance: 0.2 mm)";
     FOOTHOLD_SLOPE = "foothold_slope", "1", Some(0.01), None, "slope of a foothold beyond contact.max_slope";
-    INSIDE = "inside", "mm", Some(0.0), None, "distance of a standing foot beyond the border of the terrain";
+    INSIDE = "inside", "mm", Some(0.0), None, "distance of a standing foot beyond the edge of the terrain";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
-    GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where asked for";
-    BASE_JUMP = "base_jump", "mm", Some(0.5), None, "the base moves on without jumps";
-    FOOT_JUMP = "foot_jump", "mm", Some(0.5), None, "the feet move on without jumps";
-    FORCE_JUMP = "force_jump", "% m g", Some(3.0), None, "the forces change without jumps, at switches of contact, too";
-    BASE_ACCELERATION = "base_acceleration_rms", "m/s²", None, Some(1.5), "how smooth the base moves";
-    ANGULAR_SPEED = "angular_speed_max", "rad/s", None, Some(1.0), "how fast the base turns";
-    FORCE_RATE = "force_rate_rms", "m g/s", None, None, "how fast the forces change";
-    LEAST_APEX = "swing_apex_least", "mm", None, None, "the lowest apex of a swing over the ground";
+    GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given";
+    BASE_JUMP = "base_jump", "mm", Some(0.5), None, "the base position has no jumps";
+    FOOT_JUMP = "foot_jump", "mm", Some(0.5), None, "the foot positions have no jumps";
+    FORCE_JUMP = "force_jump", "% m g", Some(3.0), None, "the forces have no jumps, not even at lift-off and touch-down";
+    BASE_ACCELERATION = "base_acceleration_rms", "m/s²", None, Some(1.5), "acceleration of the base, root mean square";
+    ANGULAR_SPEED = "angular_speed_max", "rad/s", None, Some(1.0), "largest angular speed of the base";
+    FORCE_RATE = "force_rate_rms", "m g/s", None, None, "rate of change of the forces, root mean square";
+    LEAST_APEX = "swing_apex_least", "mm", None, None, "the lowest apex of a swing above the ground";
     LEAST_CLEARANCE = "base_clearance_least", "mm", None, None, "least distance of the torso's underside from the ground";
 }
 
 /// The limits in force.
 #[derive(Clone, Debug, Default)]
-pub struct Limits {
+pub struct CheckLimits {
     strict: bool,
     changed: BTreeMap<String, f64>,
 }
 
-impl Limits {
-    /// The default limits; with `strict`, how the base moves counts too.
+impl CheckLimits {
+    /// The default limits; with `strict`, limits on the base's acceleration and angular speed as well.
     pub fn new(strict: bool) -> Self {
         Self { strict, changed: BTreeMap::new() }
     }
@@ -93,8 +93,7 @@ impl Limits {
         for (name, value) in table {
             let names: Vec<&str> = LAWS.iter().map(|law| law.name).collect();
             if !names.contains(&name.as_str()) {
-                let guess =
-                    closest_word(&name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let guess = closest(&name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let what = format!("no such law; {guess}allowed: {}", names.join(", "));
                 return Err(Error::input(format!("{file}: {name}: {what}")));
             }
@@ -112,7 +111,7 @@ impl Limits {
     }
 
     /// The limit of a law, if it has one.
-    pub fn of(&self, law: &Law) -> Option<f64> {
+    pub fn of(&self, law: &CheckedLaw) -> Option<f64> {
         let strict = if self.strict { law.strict } else { None };
         self.changed.get(law.name).copied().or(strict).or(law.limit)
     }

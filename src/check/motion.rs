@@ -1,6 +1,8 @@
-//! The body: reach, clearance, start and goal, and whether anything jumps.
+//! The base: reach, clearance, start and goal, and whether anything jumps.
 
-use super::{Finding, Residuals, Subject, Worst, add, laws, norm, rms, rotate, rotate_back, scale, sub};
+use super::laws;
+use super::subject::{Finding, Residuals, Subject, Worst, rms};
+use super::vector::{add, norm, rotate, rotate_back, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     reach(s, findings, residuals);
@@ -72,11 +74,11 @@ fn ends(s: &Subject, findings: &mut Vec<Finding>) {
     }
 }
 
-/// What a step adds to a position beyond its velocities, and what a step changes in a force beyond its neighbours.
+/// By how much a position changes from sample to sample beyond its velocities, and a force beyond its changes before and after.
 fn jumps(s: &Subject, findings: &mut Vec<Finding>) {
     let plan = s.plan;
     let (mut base, mut foot, mut force) = (Worst::default(), Worst::default(), Worst::default());
-    // Trapezoidal rule: for smooth motion the rest is of third order in the step.
+    // Trapezoidal rule: for smooth motion the remainder is of third order in the step.
     let rest = |p: &[[f64; 3]], v: &[[f64; 3]], a: usize, b: usize| {
         1e3 * norm(sub(sub(p[b], p[a]), scale(0.5 * s.step, add(v[a], v[b]))))
     };
@@ -85,7 +87,7 @@ fn jumps(s: &Subject, findings: &mut Vec<Finding>) {
         for e in 0..s.feet {
             let (a, b) = ((n - 1) * s.feet + e, n * s.feet + e);
             foot.meet(rest(&plan.foot_position, &plan.foot_velocity, a, b), n, Some(e));
-            // A force may change quickly, but then it does so over several samples.
+            // A force may change quickly, but then over several samples.
             let change = |n: usize| norm(sub(s.foot_force(n, e), s.foot_force(n - 1, e)));
             let before = if n > 1 { change(n - 1) } else { 0.0 };
             let after = if n + 1 < s.samples { change(n + 1) } else { 0.0 };

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::console::Console;
 use super::ending::Ending;
 use super::figures::figures;
-use crate::check::{Limits, check_with};
+use crate::check::{CheckLimits, check_with};
 use crate::files::{ensure_writable, write_atomically};
 use crate::plan::Plan;
 use crate::{Result, report};
@@ -19,7 +19,7 @@ Examples:
   warpgait check hill.plan.npz --plot residuals.svg   and a drawing of the residuals over time
   warpgait check hill.plan.npz --limits limits.toml   with other limits, such as: friction = 1.0
 
-Exit codes: 0 the plan is solved and every check holds; 1 it is not; 2 bad input.";
+Exit codes: 0 the plan is solved and every check holds; 1 otherwise; 2 bad input.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -41,7 +41,7 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
     if let Some(plot) = &arguments.plot {
         ensure_writable(plot)?;
     }
-    let mut limits = Limits::new(arguments.strict);
+    let mut limits = CheckLimits::new(arguments.strict);
     if let Some(file) = &arguments.limits {
         limits = limits.read(file)?;
     }

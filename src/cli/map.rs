@@ -48,7 +48,7 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     }
     let loaded = scenario::load(&arguments.scenario, &arguments.set)?;
     listen_for_ctrl_c()?;
-    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir)?;
+    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     let mut progress = ProgressLine::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
     let mut show = |event: &Event| {

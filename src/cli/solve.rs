@@ -41,8 +41,8 @@ pub(super) struct SolveArguments {
     /// Override a value of the scenario: a dotted key, and a TOML value or a bare word; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Override the formulation, like --set formulation=…
-    #[arg(long, value_name = "warped|direct")]
+    /// Override the formulation: warped, direct or hybrid
+    #[arg(long, value_name = "NAME")]
     formulation: Option<String>,
     /// The drawing of the plan to write, an SVG file [default: NAME.svg next to the plan]
     #[arg(long, value_name = "FILE", conflicts_with = "no_plot")]

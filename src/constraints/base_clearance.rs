@@ -1,10 +1,10 @@
-//! The torso's underside stays clear of the ground.
+//! The torso's underside keeps clear of the ground.
 //!
 //! ```text
 //!   zᵀq − h(q) ≥ base_clearance,  q = p + R b, for points b of the underside
 //! ```
 //!
-//! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` looks at every sample.
+//! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` evaluates every sample.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,10 +19,10 @@ use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::rotation::cross_matrix;
 
-/// Samples between two that are looked at.
+/// Every how many samples there are rows.
 const STRIDE: usize = 4;
 
-/// The underside over the ground.
+/// The clearance of the underside.
 #[derive(Clone, Debug)]
 pub struct BaseClearance {
     clearance: f64,
@@ -73,7 +73,7 @@ impl Constraint for BaseClearance {
             let (base, node) = (&state.base[*k], &model.layout.base[*k]);
             let (arm, _, _, by_q) = point(model, base, b);
             // dq = dp + δ × R b.
-            Tangent::position(model, &base.point, node).add_along(&by_q, &mut sink.row(first + r));
+            Tangent::base(model, base, node).add_along(&by_q, &mut sink.row(first + r));
             Tangent::turn(model, base, node).add_along(&arm.cross(&by_q), &mut sink.row(first + r));
         }
     }
@@ -90,7 +90,7 @@ impl Constraint for BaseClearance {
         for points in self.places.chunk_by(|a, b| a.0 == b.0) {
             let k = points[0].0;
             let (base, node) = (&state.base[k], &model.layout.base[k]);
-            // All points of a sample depend on the same pose: their forms are summed first.
+            // All points of a sample depend on the same pose, so their forms are summed before they are scattered.
             let [mut moves, mut both, mut turns] = [Matrix3::zeros(); 3];
             for ((_, b), &lambda) in points.iter().zip(&mut multipliers) {
                 let (arm, ground, _, by_q) = point(model, base, b);
@@ -103,7 +103,7 @@ impl Constraint for BaseClearance {
                 both += form * by_turn;
                 turns += by_turn.transpose() * form * by_turn;
             }
-            let position = Tangent::position(model, &base.point, node);
+            let position = Tangent::base(model, base, node);
             let turn = Tangent::turn(model, base, node);
             position.quadratic(&moves, sink);
             position.cross(&both, &turn, sink);

@@ -6,8 +6,10 @@
 //!   least ≤ a_0 Δt,  least ≤ T − b_last Δt   the first and the last stance, which include standing at both ends
 //! ```
 //!
-//! A swing takes at least [`SHORTEST_SWING`] time steps besides. That the durations of a foot sum to the horizon T needs no row: the switches are the variables. Rows: by foot, its phases
-//! in order of time, s.
+//! A swing also takes at least [`SHORTEST_SWING`] time steps. The durations of a foot sum to the horizon T without a row,
+//! because the variables are the switches.
+//!
+//! Rows: for each foot, its phases in order of time, s.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::Sink;

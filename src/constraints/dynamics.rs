@@ -1,4 +1,4 @@
-//! Eq. 11, the position-based centroidal dynamics (PCDM), centred and with gravity, or backward as printed.
+//! Eq. 11, the position-based centroidal dynamics (PCDM) by the times of Eq. 14: centered and with gravity, or backward as printed.
 //!
 //! ```text
 //!   Σ_l w_l Σ_i f_i(t_l) + m g                    = m/Δt² Σ_j c_j p(t_j)
@@ -11,12 +11,12 @@
 //! | `pcdm` | 0 1 −2 1 | 0 1 · 1 | 1/6 at t₋, 2/3 at t, 1/6 at t₊ |
 //! | `pcdm-backward` (Eq. 11) | 1 −2 1 0 | 1 −2 · 0 | 1 at t |
 //!
-//! The centred second difference is p̈ averaged with the hat function over [t₋, t₊]. Averaging the forces in the same way
-//! makes the row the integral of the law against that hat. Forces are linear between samples, and so is p̈ (nearly); a
-//! residual that is linear between samples, has no hat average and vanishes at both ends of the motion vanishes
-//! everywhere. At the first and last sample the robot rests, and the row is the balance of forces there.
+//! The centered second difference is p̈ averaged with the hat function over [t₋, t₊]. Averaging the forces in the same way
+//! makes each row the integral of the law against that hat. Forces are linear between samples, and p̈ nearly so. A residual
+//! that is linear between samples, whose hat averages are zero and which vanishes at both ends of the motion, vanishes
+//! everywhere. At the first and the last sample the robot rests, and the row is the balance of forces there.
 //!
-//! Rows: 6 a sample, force then torque about the centre of mass, world frame, in m g and m g · 1 m.
+//! Rows: 6 a sample, force then torque about the center of mass, world frame, in m g and m g · 1 m.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -47,7 +47,7 @@ pub struct Dynamics {
 
 impl Dynamics {
     /// Second order: the default.
-    pub fn centred(intervals: usize) -> Self {
+    pub fn centered(intervals: usize) -> Self {
         Self::new(intervals, |k| Stencil {
             wrench: vec![(k - 1, 1.0 / 6.0), (k, 2.0 / 3.0), (k + 1, 1.0 / 6.0)],
             position: vec![(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)],
@@ -85,7 +85,7 @@ impl Dynamics {
         Self { stencils }
     }
 
-    /// The multipliers of the force and the torque at sample l, which enter the rows of its neighbours too.
+    /// The multipliers of the force and the torque at sample l, which enter the rows of its neighbors too.
     fn wrench_multipliers(&self, multipliers: &[f64], l: usize) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
         for k in l.saturating_sub(1)..=(l + 1).min(self.stencils.len() - 1) {
@@ -170,7 +170,7 @@ impl Constraint for Dynamics {
                     let by_force = Tangent::force(model, contact, force_node);
                     let warped = state.warped_forces[i][l];
                     let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &warped);
-                    let position = Tangent::position(model, &contact.point, foothold);
+                    let position = Tangent::foot(model, contact, foothold);
                     let (arm_form, force_form) = (cross_matrix(&arm) * weight, -cross_matrix(&f));
                     for c in 0..3 {
                         by_force.add_component(c, weight, &mut sink.row(row + c));
@@ -181,14 +181,14 @@ impl Constraint for Dynamics {
                         position.add_along(&force_form.row(c).transpose(), &mut sink.row(row + 3 + c));
                     }
                 }
-                let position = Tangent::position(model, &base.point, &layout.base[l]);
+                let position = Tangent::base(model, base, &layout.base[l]);
                 let form = cross_matrix(&total);
                 for c in 0..3 {
                     position.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
                 }
             }
             for &(j, coefficient) in &stencil.position {
-                let position = Tangent::position(model, &state.base[j].point, &layout.base[j]);
+                let position = Tangent::base(model, &state.base[j], &layout.base[j]);
                 for c in 0..3 {
                     position.add_component(c, -coefficient * acceleration, &mut sink.row(row + c));
                 }
@@ -254,7 +254,7 @@ impl Constraint for Dynamics {
         for l in 0..self.stencils.len() {
             let (by_force, by_torque) = self.wrench_multipliers(multipliers, l);
             let base = &state.base[l];
-            let base_position = Tangent::position(model, &base.point, &layout.base[l]);
+            let base_position = Tangent::base(model, base, &layout.base[l]);
             let form = -cross_matrix(&by_torque);
             for i in 0..model.feet() {
                 let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
@@ -266,7 +266,7 @@ impl Constraint for Dynamics {
                 curvature.base_position[l] -= by_arm;
                 curvature.forces[i][l] += by_force + by_torque.cross(&arm);
                 let foothold = &layout.feet[i].stances[j].foothold;
-                let position = Tangent::position(model, &contact.point, foothold);
+                let position = Tangent::foot(model, contact, foothold);
                 for force in [
                     Tangent::force(model, contact, force_node),
                     Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][l]),

@@ -1,10 +1,10 @@
-//! Footholds where the ground is not too steep, and not at the edge of where it is.
+//! Footholds where the ground is not too steep, with a margin to steeper ground.
 //!
 //! ```text
 //!   ‖∇h(p_i + d)‖² ≤ max_slope²,   d = 0, (±margin, 0, 0), (0, ±margin, 0)
 //! ```
 //!
-//! Rows: five a stance, no unit.
+//! Rows: five for each stance, dimensionless.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,12 +21,12 @@ use crate::nlp::{Model, State};
 #[derive(Clone, Debug)]
 pub struct FootholdSlope {
     max_slope: f64,
-    /// (foot, stance, where to look).
+    /// Foot, stance, and offset d.
     places: Vec<(usize, usize, [f64; 2])>,
     samples: Vec<f64>,
 }
 
-/// Where to look about a foothold, in margins.
+/// The offsets d from a foothold, in margins.
 const AROUND: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
 impl FootholdSlope {
@@ -87,7 +87,7 @@ impl Constraint for FootholdSlope {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
             let slope = gradient(&ground(model, contact, d));
-            Tangent::position(model, &contact.point, node).add_along(&slope, &mut sink.row(first + r));
+            Tangent::foot(model, contact, node).add_along(&slope, &mut sink.row(first + r));
         }
     }
 
@@ -105,7 +105,7 @@ impl Constraint for FootholdSlope {
             let ground = ground(model, contact, d);
             curvature.contacts[i][j] += gradient(&ground) * lambda;
             let form = curvature_form(&ground) * lambda;
-            Tangent::position(model, &contact.point, node).quadratic(&form, sink);
+            Tangent::foot(model, contact, node).quadratic(&form, sink);
         }
     }
 

@@ -5,12 +5,12 @@
 //! ```
 //!
 //! For u > 0 this is the same convex set up to ε = [`CONE_ROUNDING`] m g (too large by ε²/(4 ν u), below 10⁻⁴ m g where
-//! [`super::normal_force`] holds). The quotient curves along ‖f_t‖ as well as around the axis; the root of Eq. 5 does not,
-//! so that Newton's steps would jump from one side of a slim cone to the other for ever. The normal is constant during a
-//! stance, f is linear between its samples and the cone is convex: what holds at the samples holds in between.
+//! [`super::normal_force`] holds). The quotient has curvature along ‖f_t‖ as well as around the axis. The root of Eq. 5
+//! does not, and Newton's steps can then jump from one side of a slim cone to the other forever. The normal is constant
+//! during a stance, f is linear between samples, and the cone is convex: what holds at the samples holds in between.
 //!
-//! Rows: one for each free force, in m g. Where durations are optimized the rows are on the full force that f is a share of,
-//! which the cone then holds as well.
+//! Rows: one for each free force, in m g. Where durations are optimized, the rows are on the full force ḡ; the cone then
+//! also contains f = σ ḡ.
 
 use nalgebra::{Matrix3, Vector3};
 

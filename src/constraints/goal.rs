@@ -1,7 +1,7 @@
-//! The goal: where the base is at the end, and where it looks.
+//! The goal: position and heading of the base at the end.
 //!
 //! ```text
-//!   p_x(T), p_y(T) = goal;    −sin ψ R_xx(T) + cos ψ R_yx(T) = 0   (heading ψ, when asked for)
+//!   p_x(T), p_y(T) = goal;    −sin ψ R_xx(T) + cos ψ R_yx(T) = 0   (heading ψ, when given)
 //! ```
 //!
 //! Rows: x, y in m, then the heading (sine of the error).
@@ -29,7 +29,7 @@ impl Goal {
     }
 }
 
-/// Normal of the heading: zero component of the base's x axis along it.
+/// Horizontal normal of the heading, along which the base's x axis has no component.
 fn side(yaw: f64) -> Vector3<f64> {
     Vector3::new(-yaw.sin(), yaw.cos(), 0.0)
 }
@@ -61,7 +61,7 @@ impl Constraint for Goal {
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         let (base, node) = (&state.base[self.last], &model.layout.base[self.last]);
-        let position = Tangent::position(model, &base.point, node);
+        let position = Tangent::base(model, base, node);
         position.add_component(0, 1.0, &mut sink.row(first));
         position.add_component(1, 1.0, &mut sink.row(first + 1));
         if let Some(yaw) = self.yaw {

@@ -1,13 +1,14 @@
-//! Hip and knee of a swinging leg turn no faster than they can.
+//! Speed limits of hip and knee of a swinging leg.
 //!
 //! ```text
 //!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  q = (φ, κ),  r = Rᵀ(p_i − p)
 //! ```
 //!
-//! φ and κ are the angles of thigh and knee, see [`crate::leg`]. The abduction is slow and has no row. Legs of which the robot's file knows
-//! nothing have none either.
+//! φ and κ are the angles of thigh and knee, see [`crate::leg`]. The abduction is slow and has no row. Legs that the robot's
+//! file does not describe have none either.
 //!
-//! Over whole intervals a foot that is flicked over an edge within two of them would pass at half its true speed.
+//! Differences are over half intervals. Over whole ones, a foot that flicks over an edge within two of them would appear at
+//! half its true speed.
 //!
 //! Rows: thigh, knee for each half of an interval of which at least one end lies in a swing; fraction of the limit.
 
@@ -30,7 +31,7 @@ pub struct JointSpeed {
 }
 
 impl JointSpeed {
-    /// For every swing of a leg that is known.
+    /// For every swing of a leg whose geometry is known.
     pub fn new(model: &Model) -> Self {
         let mut places = Vec::new();
         for (i, leg) in model.legs.iter().enumerate() {
@@ -56,7 +57,7 @@ fn jets(model: &Model, state: &State, (i, ends, leg): &(usize, [Instant; 2], Leg
     angles(leg, Jet::variables(&foot_in_base::value(model, state, (*i, ends[after]))))
 }
 
-/// Of the row, by the angle at the end `after`.
+/// Derivative of a row with respect to the angle at its start (0) or end (1).
 fn scale(model: &Model, leg: &Leg, after: usize) -> f64 {
     (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step * leg.speed_limit)
 }

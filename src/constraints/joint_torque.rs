@@ -1,10 +1,10 @@
-//! The motors of a standing leg are strong enough for the planned force.
+//! Torque limits of the joints of a standing leg.
 //!
 //! ```text
 //!   −fraction ≤ (∂r/∂q)ᵀ Rᵀ f / torque_limit ≤ fraction,  r = Rᵀ(p_i − p)
 //! ```
 //!
-//! The torques of a leg without mass, see [`crate::leg`]. Legs of which the robot's file knows nothing have no rows.
+//! The torques are those of a massless leg, see [`crate::leg`]. Legs that the robot's file does not describe have no rows.
 //!
 //! Rows: HAA, HFE, KFE for each free force; fraction of the limit.
 
@@ -31,14 +31,14 @@ pub struct JointTorque {
 }
 
 impl JointTorque {
-    /// For every force of a leg that is known.
+    /// For every force of a leg whose geometry is known.
     pub fn new(model: &Model) -> Self {
         let all = force_samples(model, |i| model.legs[i].is_some());
         Self { places: all.into_iter().filter_map(|at| Some((at, model.legs[at.foot]?))).collect() }
     }
 }
 
-/// ∂r/∂q by joint, each in (N m of its limit)⁻¹ m g.
+/// ∂r/∂q by joint, each times m g over the joint's torque limit.
 fn columns<T: Scalar>(model: &Model, leg: &Leg, r: [T; 3]) -> [[T; 3]; 3] {
     let columns = leg.posture(r).jacobian();
     std::array::from_fn(|j| columns[j].map(|entry| entry * (model.mass * GRAVITY / leg.torque_limit[j])))
@@ -68,7 +68,7 @@ fn tangents<'a>(
 ) -> (Tangent<'a>, [Tangent<'a>; 2]) {
     let contact = &state.contacts[i][j];
     let foothold = &model.layout.feet[i].stances[j].foothold;
-    let (_, node) = state.force_node(model, i, k).expect("places are those of free forces");
+    let (_, node) = state.force_node(model, i, k).expect("a force sample is that of a free force");
     let own = Tangent::force(model, contact, node);
     let by_foothold = Tangent::force_by_foothold(model, contact, foothold, &state.warped_forces[i][k]);
     (Tangent::turn(model, &state.base[k], &model.layout.base[k]), [own, by_foothold])

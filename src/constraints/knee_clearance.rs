@@ -1,11 +1,11 @@
-//! Knees and shanks stay clear of the ground, which on cliffs they are the first to hit.
+//! Knees and shanks keep clear of the ground. On cliffs they are the first parts to hit it.
 //!
 //! ```text
 //!   (zᵀq − h(q)) n_z ≥ radius + margin,  q = p + R v(r),  r = Rᵀ(p_i − p)
 //! ```
 //!
-//! v(r): a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]; the knee with its radius, and the shank's
-//! outermost corner. Legs of which the robot's file knows nothing have no rows.
+//! v(r) is a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]: the knee with its radius, and the
+//! shank's outermost corner. Legs that the robot's file does not describe have no rows.
 //!
 //! Rows: knee, corner for each foot at every `STRIDE`-th sample, m.
 
@@ -24,10 +24,10 @@ use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
-/// Samples between two that are looked at.
+/// Every how many samples there are rows.
 const STRIDE: usize = 2;
 
-/// Knees over the ground.
+/// The clearance of knees and shanks.
 #[derive(Clone, Debug)]
 pub struct KneeClearance {
     places: Vec<(usize, Instant, Leg)>,

@@ -14,7 +14,7 @@ pub const BASE_CLEARANCE: f64 = 0.01;
 /// Between knee or shank and the ground, m: for what happens between the samples, and the ground's curvature across the shank.
 pub const KNEE_CLEARANCE: f64 = 0.02;
 /// Fraction of a joint's speed limit that a plan uses. The rest is for what happens between samples and for what the plan
-/// does not know: the legs' own mass moves the trunk relative to the centre of mass.
+/// does not know: the legs' own mass moves the trunk relative to the center of mass.
 pub const JOINT_SPEED: f64 = 0.72;
 /// Fraction of a joint's torque limit that a plan uses. The rest is for what the plan does not know: the weight of the legs,
 /// and the controller's corrections.

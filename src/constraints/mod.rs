@@ -1,6 +1,6 @@
 //! The constraints of Eq. 1–5 and Eq. 7–13, one a file, each with its first and second derivatives.
 //!
-//! A constraint is written in ambient quantities; see [`crate::nlp`]. What several of them use lies there as well:
+//! A constraint is written in ambient quantities; see [`crate::nlp`]. What several of them use is there as well:
 //! [`crate::nlp::foot_in_base`], [`crate::nlp::contact_force`], [`crate::nlp::ground_normal`]. By how much each is tightened so that it
 //! holds between the samples is in [`margins`].
 

@@ -6,14 +6,13 @@
 //!   ω = (φ̇ − ψ̇ sin θ,  θ̇ cos φ + ψ̇ cos θ sin φ,  −θ̇ sin φ + ψ̇ cos θ cos φ)
 //! ```
 //!
-//! with ZYX Euler angles (roll φ, pitch θ, yaw ψ). It asks for second derivatives of position and orientation in time, and in F
-//! those of 𝒫(J) are third derivatives of φ, which jump from cell to cell: so it serves the direct formulation only
-//! ([`crate::planner::solve::validate`] says so). Forces and p̈ are both linear between samples there: Newton's law that holds
-//! at the samples holds everywhere.
+//! with ZYX Euler angles (roll φ, pitch θ, yaw ψ). It needs second derivatives of position and orientation in time. In F
+//! those of 𝒫(J) involve third derivatives of φ, which jump from cell to cell, so this law is for the direct formulation only.
+//! Forces and p̈ are both linear between samples there: if Newton's law holds at the samples, it holds everywhere.
 //!
 //! The rate of the angular momentum depends on nine numbers; dual numbers give its derivatives.
 //!
-//! Rows: 6 a sample, force then torque about the centre of mass, world frame, in m g and m g · 1 m.
+//! Rows: 6 a sample, force then torque about the center of mass, world frame, in m g and m g · 1 m.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use num_dual::{DualNum, hessian, jacobian};
@@ -33,7 +32,7 @@ type Turn = SVector<f64, 9>;
 /// Newton's and Euler's law at every sample, in ambient space.
 #[derive(Clone, Debug)]
 pub struct NewtonEuler {
-    /// The left sides: forces with gravity, and torques.
+    /// The left-hand sides: forces with gravity, and torques.
     wrench: Dynamics,
     /// I, kg m², base frame.
     inertia: Matrix3<f64>,

@@ -1,11 +1,11 @@
-//! Limits of the normal force: how hard a foot may push, and an adhesive one pull.
+//! Limits of the normal force: how hard a foot may push, and how hard an adhesive one may pull.
 //!
 //! ```text
 //!   −pull_limit ≤ n·f ≤ force_limit      (adhesive feet)
-//!     least ≤ n·f ≤ force_limit          (others: a standing foot presses on the ground, [`LEAST_NORMAL_FORCE`])
+//!     least ≤ n·f ≤ force_limit          (others: a standing foot presses on the ground by [`LEAST_NORMAL_FORCE`])
 //! ```
 //!
-//! Rows: one for each free force, in m g; as in [`super::friction`] for the full one.
+//! Rows: one for each free force, in m g; where durations are optimized, for the full force as in [`super::friction`].
 
 use crate::nlp::contact_force::{ForceSample, ForceTangents, force_samples};
 use crate::nlp::curvature::NodeCurvature;

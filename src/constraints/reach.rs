@@ -4,7 +4,7 @@
 //!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) ≤ center + half_size
 //! ```
 //!
-//! Rows: for each place (foot, sample), x, y, z in the base frame, m.
+//! Rows: x, y, z in the base frame for each foot and sample, m.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;

@@ -4,10 +4,10 @@
 //!   zᵀp_i − h(p_i) = 0
 //! ```
 //!
-//! In F the ground is z̄ = 0 up to the misfit of the map's bottom face; asking for it in ambient space makes the gap exactly
-//! zero there, and z̄ is then minus that misfit. A foothold is a variable of its own stance and cannot slip.
+//! In F the ground is z̄ = 0 up to the misfit of the map's bottom face; imposing it in ambient space makes the gap exactly
+//! zero there, and z̄ is then minus that misfit. Each stance has one foothold, so a foot cannot slip.
 //!
-//! Rows: one a stance, m.
+//! Rows: one for each stance, m.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::ground_normal::height_form;
@@ -66,8 +66,7 @@ impl Constraint for OnGround {
         for (r, &(i, j)) in self.places.iter().enumerate() {
             let contact = &state.contacts[i][j];
             let node = &model.layout.feet[i].stances[j].foothold;
-            Tangent::position(model, &contact.point, node)
-                .add_along(&contact.gap().1, &mut sink.row(first + r));
+            Tangent::foot(model, contact, node).add_along(&contact.gap().1, &mut sink.row(first + r));
         }
     }
 
@@ -84,7 +83,7 @@ impl Constraint for OnGround {
             let node = &model.layout.feet[i].stances[j].foothold;
             curvature.contacts[i][j] += contact.gap().1 * lambda;
             let form = height_form(&contact.ground) * -lambda;
-            Tangent::position(model, &contact.point, node).quadratic(&form, sink);
+            Tangent::foot(model, contact, node).quadratic(&form, sink);
         }
     }
 

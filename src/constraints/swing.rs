@@ -5,9 +5,9 @@
 //! ```
 //!
 //! The left side is the distance to the tangent plane of the ground below the foot. In the middle of a swing the clearance
-//! is the scenario's `swing_clearance`; at the samples before and after it a share of it that falls off towards both ends
-//! like the parabola 4u(1−u), so that feet leave and land steeply enough to pass stones. In the space of the variables the
-//! free control points are bounded as well where that is sound (see `planner::problem`).
+//! is the scenario's `swing_clearance`. At the samples before and after it, a fraction of it is required that falls off toward
+//! both ends like the parabola 4u(1−u), so that feet lift off and touch down steeply enough to clear stones. In F the free
+//! control points are bounded as well (see `planner::problem`).
 //!
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
 //! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
@@ -24,7 +24,7 @@ use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::layout::Phase;
 
-/// Share of the parabola that is asked for away from the middle.
+/// Fraction of the parabola that is required away from the middle.
 const FALL_OFF: f64 = 0.5;
 
 /// Where a row acts.
@@ -34,7 +34,7 @@ enum At {
     Point { foot: usize, n: usize, u: f64, apex: bool, sample: f64 },
 }
 
-/// Swinging feet over the ground.
+/// The clearance of swinging feet.
 #[derive(Clone, Debug)]
 pub struct SwingClearance {
     clearance: f64,
@@ -104,8 +104,7 @@ impl Constraint for SwingClearance {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::position(model, &foot.point, node)
-                .add_along(&self.distance(state, at).1, &mut sink.row(first + r));
+            Tangent::foot(model, foot, node).add_along(&self.distance(state, at).1, &mut sink.row(first + r));
         }
     }
 
@@ -124,7 +123,7 @@ impl Constraint for SwingClearance {
                 At::Sample { foot, k, .. } => curvature.swings[foot][k] += by_position * lambda,
                 At::Point { foot, n, .. } => curvature.points[foot][n] += by_position * lambda,
             }
-            Tangent::position(model, &foot.point, node).quadratic(&(form * lambda), sink);
+            Tangent::foot(model, foot, node).quadratic(&(form * lambda), sink);
         }
     }
 

@@ -1,4 +1,4 @@
-//! How the base accelerates: w ∫ ‖(p̄̈, θ̄̈)‖² dt.
+//! The base's acceleration: w ∫ ‖(p̄̈, θ̄̈)‖² dt.
 //!
 //! Exact up to the trapezoidal rule: the base's acceleration is linear between the samples, and linear in the variables.
 
@@ -7,7 +7,7 @@ use crate::nlp::sink::{Differential, Gradient, Sink};
 use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 
-/// A base that moves evenly.
+/// Penalizes acceleration of the base.
 #[derive(Clone, Debug)]
 pub struct BaseAcceleration {
     weight: f64,

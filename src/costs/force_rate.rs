@@ -1,8 +1,8 @@
-//! How fast the forces change: w ∫ ‖f̄̇‖² dt in (m g)²/s.
+//! The rate of change of the forces: w ∫ ‖f̄̇‖² dt in (m g)²/s.
 //!
-//! Exact: the rate is constant between the samples. It is that of the forces which act, also where durations are optimized
-//! and these are shares f̄ = σ ḡ of their variables: so a foot is loaded and unloaded gently at its switches as well. Next to
-//! switches a small share of the same cost is on ḡ, which would grow without bound where σ vanishes.
+//! Exact: the rate is constant between the samples. It is that of the forces that act; where durations are
+//! optimized, these are f̄ = σ ḡ with the variables ḡ, so that a foot is loaded and unloaded gently at its switches as well. Next
+//! to switches, a small fraction of the same cost is on ḡ, which would otherwise grow without bound where σ vanishes.
 
 use nalgebra::Vector3;
 
@@ -12,15 +12,15 @@ use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 
-/// Weight of the rate of ḡ, of that of f̄.
-const FULL_SHARE: f64 = 2e-3;
+/// Weight of the rate of ḡ, relative to that of f̄.
+const FULL_FRACTION: f64 = 2e-3;
 
-/// Forces that change slowly.
+/// Penalizes fast changes of force.
 #[derive(Clone, Debug)]
 pub struct ForceRate {
-    /// (foot, sample): the interval from there to the next sample, where one of its ends may bear something.
+    /// (foot, sample): the interval from there to the next sample, where a force may act at either end.
     intervals: Vec<(usize, usize)>,
-    /// Those of them where f̄ differs from ḡ.
+    /// Those of them in which f̄ differs from ḡ.
     timed: Vec<(usize, usize)>,
     weight: f64,
 }
@@ -44,7 +44,7 @@ impl ForceRate {
         state.warped_forces[i][k + 1] - state.warped_forces[i][k]
     }
 
-    /// The same of ḡ.
+    /// The same for ḡ.
     fn full_change(state: &State, (i, k): (usize, usize)) -> Vector3<f64> {
         state.warped_full_forces[i][k + 1] - state.warped_full_forces[i][k]
     }
@@ -69,7 +69,7 @@ impl Cost for ForceRate {
     fn value(&self, _model: &Model, state: &State, _x: &[f64]) -> f64 {
         let sum: f64 = self.intervals.iter().map(|&at| Self::change(state, at).norm_squared()).sum();
         let full: f64 = self.timed.iter().map(|&at| Self::full_change(state, at).norm_squared()).sum();
-        0.5 * self.weight * (sum + FULL_SHARE * full)
+        0.5 * self.weight * (sum + FULL_FRACTION * full)
     }
 
     fn gradient(&self, model: &Model, state: &State, _x: &[f64], gradient: &mut Gradient) {
@@ -83,7 +83,7 @@ impl Cost for ForceRate {
             }
         }
         for (at, [before, after]) in self.full_nodes(model) {
-            let change = Self::full_change(state, at) * (FULL_SHARE * self.weight);
+            let change = Self::full_change(state, at) * (FULL_FRACTION * self.weight);
             for d in 0..3 {
                 gradient.node(before, d, -change[d]);
                 gradient.node(after, d, change[d]);
@@ -115,7 +115,7 @@ impl Cost for ForceRate {
                 }
             }
         }
-        let weight = FULL_SHARE * weight;
+        let weight = FULL_FRACTION * weight;
         for (_, [before, after]) in self.full_nodes(model) {
             for d in 0..3 {
                 sink.own(before, d, d, weight);

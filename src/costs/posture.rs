@@ -1,6 +1,6 @@
 //! Feet under the body: w Σ ‖R(t)ᵀ(p_i − p(t)) − nominal_i‖² at the middle of every stance.
 //!
-//! The laws of motion leave the footholds free within their boxes; this is what makes the steps of a pair of legs alike.
+//! The laws of motion leave the footholds free within their boxes; this cost makes the steps of left and right legs alike.
 
 use nalgebra::Matrix3;
 
@@ -10,7 +10,7 @@ use crate::nlp::sink::{Gradient, Sink};
 use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 
-/// Footholds near the nominal ones.
+/// Penalizes footholds away from the nominal ones.
 #[derive(Clone, Debug)]
 pub struct Posture {
     weight: f64,

@@ -1,11 +1,11 @@
-//! How swinging feet accelerate: w ∫ ‖p̄̈_i‖² dt over the swings.
+//! The acceleration of swinging feet: w ∫ ‖p̄̈_i‖² dt over the swings.
 //!
 //! ```text
-//!   w T⁻³ Σ_m share_m ‖S''(u_m)‖²,  T = b − a the duration of the swing
+//!   w T⁻³ Σ_m w_m ‖S''(u_m)‖²,  T = b − a the duration of the swing
 //! ```
 //!
 //! By the trapezoidal rule on the swing's own knots u_m, between which S'' is linear. The path S(u) does not depend on time,
-//! so T stands in front of everything, given or not.
+//! so T is a common factor, whether it is given or optimized.
 
 use nalgebra::Vector3;
 
@@ -16,7 +16,7 @@ use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
 use crate::trajectory::spline::SWING_INTERVALS;
 
-/// Feet that swing evenly.
+/// Penalizes acceleration of swinging feet.
 #[derive(Clone, Debug)]
 pub struct SwingAcceleration {
     swings: Vec<WeightedSwing>,
@@ -41,9 +41,9 @@ impl SwingAcceleration {
         for (foot, variables) in layout.feet.iter().enumerate() {
             for (swing, s) in variables.swings.iter().enumerate() {
                 let knots = (0..=SWING_INTERVALS).map(|knot| {
-                    let share = if knot == 0 || knot == SWING_INTERVALS { 0.5 } else { 1.0 };
+                    let end = if knot == 0 || knot == SWING_INTERVALS { 0.5 } else { 1.0 };
                     let node = layout.swing_node(foot, swing, knot as f64 / SWING_INTERVALS as f64, 2);
-                    (node, 2.0 * weight * share / SWING_INTERVALS as f64)
+                    (node, 2.0 * weight * end / SWING_INTERVALS as f64)
                 });
                 swings.push(WeightedSwing { foot, swing, switches: s.switches, knots: knots.collect() });
             }
@@ -51,7 +51,7 @@ impl SwingAcceleration {
         Self { swings, time_step: layout.time_step }
     }
 
-    /// T⁻³ and its first and second derivatives with respect to touch-down; those with respect to lift-off have a minus each.
+    /// T⁻³ and its first and second derivatives with respect to touch-down; each differentiation with respect to lift-off changes the sign.
     fn factor(&self, state: &State, swing: &WeightedSwing) -> [f64; 3] {
         let [a, b] = state.switches[swing.foot][swing.swing];
         let duration = (b - a) * self.time_step;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 
-/// Writes a whole file by way of a temporary one beside it.
+/// Writes a whole file, or leaves what was there.
 pub fn write_atomically(target: &Path, content: &[u8]) -> Result<()> {
     let temporary = temporary_beside(target)?;
     let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, target));
@@ -17,7 +17,7 @@ pub fn write_atomically(target: &Path, content: &[u8]) -> Result<()> {
     })
 }
 
-/// Makes sure that a file can be written at `target`, without touching what is there.
+/// Checks that a file can be written at `target`, without touching what is there.
 pub fn ensure_writable(target: &Path) -> Result<()> {
     let temporary = temporary_beside(target)?;
     File::create(&temporary)
@@ -25,7 +25,10 @@ pub fn ensure_writable(target: &Path) -> Result<()> {
         .map_err(|e| Error::input(format!("{}: cannot be written: {e}", target.display())))
 }
 
-/// A name in the same folder, so that renaming does not copy; refuses targets that cannot be files.
+/// A temporary name in the same folder, so that renaming does not copy.
+///
+/// # Errors
+/// For targets that cannot be files.
 pub(crate) fn temporary_beside(target: &Path) -> Result<PathBuf> {
     let refuse = |why: &str| Err(Error::input(format!("{}: cannot be written: {why}", target.display())));
     let Some(name) = target.file_name() else { return refuse("this is not the name of a file") };

@@ -28,7 +28,7 @@ impl NpzWriter {
         Ok(Self { zip: Some(ZipWriter::new(BufWriter::new(file))), temporary, target: target.to_path_buf() })
     }
 
-    /// Adds a float64 array; `values` in C order, as many as the shape says.
+    /// Adds a float64 array; `values` in C order, as many as the shape requires.
     pub fn add_f64(
         &mut self,
         name: &str,
@@ -51,7 +51,7 @@ impl NpzWriter {
         self.add_f64(name, &shape, values.iter().flatten().copied())
     }
 
-    /// Adds an array of truth values.
+    /// Adds an array of booleans.
     pub fn add_bool(&mut self, name: &str, shape: &[usize], values: &[bool]) -> Result<()> {
         self.add(name, shape, "|b1", |item: &mut dyn FnMut(&bool) -> std::io::Result<()>| {
             values.iter().try_for_each(item)
@@ -60,7 +60,7 @@ impl NpzWriter {
 
     /// Adds an array of strings (`<U…`); an empty shape is a single string.
     pub fn add_str(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<()> {
-        // NumPy knows no strings of zero width.
+        // NumPy has no strings of zero width.
         let width = values.iter().map(|s| s.chars().count()).max().unwrap_or(0).max(1);
         self.add(name, shape, &format!("<U{width}"), |item: &mut dyn FnMut(&str) -> std::io::Result<()>| {
             values.iter().try_for_each(|s| item(s))
@@ -99,7 +99,7 @@ impl NpzWriter {
         array.finish().map_err(at)
     }
 
-    /// Closes the archive and gives it its name.
+    /// Closes the archive and renames it to its target.
     pub fn finish(mut self) -> Result<()> {
         let at = |e: std::io::Error| Error::io(&self.target, e);
         let zip = self.zip.take().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
@@ -113,7 +113,7 @@ impl NpzWriter {
 
 impl Drop for NpzWriter {
     fn drop(&mut self) {
-        // After `finish` there is no such file any more; before it, a failed write must not leave one.
+        // After `finish` this file no longer exists; before it, a failed write must not leave one.
         drop(self.zip.take());
         let _ = std::fs::remove_file(&self.temporary);
     }
@@ -131,7 +131,7 @@ impl NpzReader {
         let file = path.display().to_string();
         let content = std::fs::read(path).map_err(|e| Error::io(path, e))?;
         let zip = ZipArchive::new(Cursor::new(content))
-            .map_err(|e| Error::input(format!("{file}: not an .npz archive, or cut short: {e}")))?;
+            .map_err(|e| Error::input(format!("{file}: not an .npz archive, or truncated: {e}")))?;
         Ok(Self { zip, file })
     }
 
@@ -153,7 +153,7 @@ impl NpzReader {
         Error::input(format!("{}: member `{member}`: {what}", self.file))
     }
 
-    /// A float64 array with its shape; NaN and infinities are let through.
+    /// A float64 array with its shape; NaN and infinities are allowed.
     pub fn any_f64(&mut self, name: &str) -> Result<(Vec<usize>, Vec<f64>)> {
         self.read(name, "float64 (<f8)", |dtype| dtype == "<f8")
     }
@@ -181,7 +181,7 @@ impl NpzReader {
         Ok(values.as_chunks::<K>().0.to_vec())
     }
 
-    /// An array of truth values of a known shape.
+    /// An array of booleans of a known shape.
     pub fn bool(&mut self, name: &str, shape: &[usize]) -> Result<Vec<bool>> {
         let (found, values) = self.read(name, "bool (|b1)", |dtype| dtype == "|b1")?;
         self.expect_shape(name, &found, shape)?;
@@ -214,7 +214,7 @@ impl NpzReader {
         let content = match member {
             Ok(content) => content,
             Err(ZipError::FileNotFound) => return Err(self.error(name, "missing")),
-            Err(e) => return Err(self.error(name, format!("damaged or cut short: {e}"))),
+            Err(e) => return Err(self.error(name, format!("damaged or truncated: {e}"))),
         };
         let mut rest = Cursor::new(&content[..]);
         let header = npyz::NpyHeader::from_reader(&mut rest)

@@ -1,12 +1,9 @@
 //! The ground z = h(x, y) as a C² bicubic B-spline, whatever terrain it came from.
 //!
-//! h interpolates samples on a regular grid (not-a-knot ends) and is continued beyond the grid's rectangle: curvature and
-//! slope fade out there, so that h is C² and bounded on the whole plane and constant far away. Every derivative is that
-//! of the very function that [`Heightfield::height`] returns, inside and outside.
-//!
-//! [`raster`] is what happens to measured heights before they are interpolated: filling holes and smoothing.
+//! h interpolates samples on a regular grid (not-a-knot ends) and is extended beyond the grid's rectangle: curvature and
+//! slope fade out there, so that h is C² and bounded on the whole plane, and constant far away. Every derivative is exactly
+//! that of the function that [`Heightfield::height`] returns, inside and outside.
 
-pub mod raster;
 mod spline;
 
 use crate::error::{Error, Result};
@@ -16,7 +13,7 @@ pub use spline::{CURVATURE_FADE, SLOPE_FADE};
 /// Grids larger than this are refused: the samples alone would take more than 128 MB.
 pub const MAX_SAMPLES: usize = 1 << 24;
 
-/// Heights beyond this are taken for a mistake in units, m.
+/// Larger heights are taken for a mistake in units, m.
 pub const MAX_HEIGHT: f64 = 1e4;
 
 /// h and its derivatives up to the third order at one point.
@@ -37,7 +34,7 @@ pub struct HeightJet {
 pub struct Grid {
     /// x, y of node (0, 0), m.
     pub origin: [f64; 2],
-    /// Distance of neighbours along x, y, m.
+    /// Distance between neighboring nodes along x, y, m.
     pub spacing: [f64; 2],
     /// Nodes along x.
     pub columns: usize,
@@ -46,8 +43,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The coarsest grid that hits the rectangle x_min, x_max, y_min, y_max exactly with nodes at most `spacing` apart
-    /// (and at least four nodes along each axis).
+    /// The coarsest grid that covers the rectangle x_min, x_max, y_min, y_max exactly, with nodes at most `spacing` apart
+    /// and at least four nodes along each axis.
     ///
     /// # Errors
     /// For a degenerate or non-finite rectangle or spacing, and for more than [`MAX_SAMPLES`] nodes.
@@ -55,26 +52,26 @@ impl Grid {
         let [x_min, x_max, y_min, y_max] = extent;
         if !extent.iter().all(|v| v.is_finite() && v.abs() <= 1e6) || x_max <= x_min || y_max <= y_min {
             return Err(Error::input(format!(
-                "terrain extent {extent:?} is not a rectangle: give x_min < x_max and y_min < y_max in metres"
+                "terrain extent {extent:?} is not a rectangle: give x_min < x_max and y_min < y_max in meters"
             )));
         }
         if !(spacing.is_finite() && spacing > 0.0) {
-            return Err(Error::input(format!("grid spacing {spacing} must be a positive length in metres")));
+            return Err(Error::input(format!("grid spacing {spacing} must be a positive length in meters")));
         }
         let [width, depth] = [x_max - x_min, y_max - y_min];
-        // A hair less, lest 6 m / 0.01 m become 601 intervals by rounding.
+        // Slightly less, so that rounding does not turn 6 m / 0.01 m into 601 intervals.
         let intervals = |length: f64| (length / spacing * (1.0 - 1e-9)).ceil().max(3.0);
         let nodes = (intervals(width) + 1.0) * (intervals(depth) + 1.0);
         if nodes > MAX_SAMPLES as f64 {
             return Err(Error::input(format!(
-                "a grid of spacing {spacing} m over {width} m x {depth} m has {nodes:.3e} nodes, more than {MAX_SAMPLES}: \
-                 take a spacing of at least {:.2e} m or a smaller extent",
+                "a grid of spacing {spacing} m over {width} m x {depth} m has {nodes:.3e} nodes, more than {MAX_SAMPLES}; \
+                 use a spacing of at least {:.2e} m or a smaller extent",
                 1.01 * (width * depth / MAX_SAMPLES as f64).sqrt()
             )));
         }
         let spacing = [width / intervals(width), depth / intervals(depth)];
         let (columns, rows) = (intervals(width) as usize + 1, intervals(depth) as usize + 1);
-        // Spacing next to the resolution of the coordinates would make nodes coincide.
+        // A spacing near the resolution of the coordinates would make nodes coincide.
         if (0..2).any(|k| spacing[k] < 1e-9 * extent.iter().fold(1.0_f64, |m, v| m.max(v.abs()))) {
             return Err(Error::input(format!(
                 "terrain extent {extent:?} is too narrow for its distance from the origin"
@@ -108,7 +105,7 @@ impl Grid {
         [self.x(0), self.x(self.columns - 1), self.y(0), self.y(self.rows - 1)]
     }
 
-    /// Values of a function of x, y at the nodes, (rows, columns) row by row. Stops at the first error.
+    /// Values of a function of x, y at the nodes, (rows, columns), row by row. Stops at the first error.
     ///
     /// # Errors
     /// Those of the function.
@@ -130,7 +127,7 @@ pub struct Heightfield {
     /// (rows, columns), m.
     samples: Vec<f64>,
     axes: [Axis; 2],
-    /// (columns + 2, rows + 2): the four that a cell needs along y lie side by side.
+    /// (columns + 2, rows + 2): the four that a cell needs along y are contiguous.
     coefficients: Vec<f64>,
 }
 
@@ -212,7 +209,7 @@ impl Heightfield {
         [dot(&wx.weights[1], &c), dot(&wx.weights[0], &c_y)]
     }
 
-    /// h and (∂h/∂x, ∂h/∂y): both for little more than one.
+    /// h and (∂h/∂x, ∂h/∂y); costs little more than one of them.
     #[inline]
     pub fn height_and_gradient(&self, x: f64, y: f64) -> (f64, [f64; 2]) {
         let (wx, wy) = (self.axes[0].weights::<2>(x), self.axes[1].weights::<2>(y));
@@ -247,12 +244,12 @@ impl Heightfield {
         self.grid.extent()
     }
 
-    /// Where the samples lie.
+    /// The grid of the samples.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// The interpolated heights, (rows, columns) row by row, m.
+    /// The interpolated heights, (rows, columns), row by row, m.
     pub fn samples(&self) -> &[f64] {
         &self.samples
     }

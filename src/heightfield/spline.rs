@@ -2,7 +2,7 @@
 
 /// Beyond an end the second derivative fades out over this length, m.
 pub const CURVATURE_FADE: f64 = 0.2;
-/// Beyond an end the slope fades out over this length, m; further out h is constant along the axis.
+/// Beyond an end the slope fades out over this length, m; farther out, h is constant along the axis.
 pub const SLOPE_FADE: f64 = 0.4;
 
 /// One axis of the grid: nodes at `origin + i·spacing`, 0 ≤ i < count, and count + 2 spline coefficients.
@@ -15,7 +15,7 @@ pub(super) struct Axis {
     pub rate: f64,
 }
 
-/// The four coefficients that matter at a point start at `first`; `weights[k]` sum them up to the k-th derivative.
+/// The four coefficients that matter at a point start at `first`; their sum weighted by `weights[k]` is the k-th derivative.
 pub(super) struct Weights<const ORDERS: usize> {
     pub first: usize,
     pub weights: [[f64; 4]; ORDERS],
@@ -30,7 +30,7 @@ impl Axis {
         self.origin + self.spacing * (self.count - 1) as f64
     }
 
-    /// Weights of value and derivatives up to order `ORDERS` − 1 ≤ 3 at x, which may lie beyond the ends.
+    /// Weights of the value and the derivatives up to order `ORDERS` − 1 ≤ 3 at x, which may lie beyond the ends.
     #[inline]
     pub fn weights<const ORDERS: usize>(&self, x: f64) -> Weights<ORDERS> {
         let u = (x - self.origin) * self.rate;
@@ -83,7 +83,7 @@ impl Axis {
         let p = slope_fade(distance);
         let q = curvature_fade(distance);
         let mut weights = [[0.0; 4]; ORDERS];
-        // P(−t) = −P(t) and Q(−t) = Q(t): each derivative in t turns the sign once more.
+        // P(−t) = −P(t) and Q(−t) = Q(t): each derivative in t flips the sign once more.
         let mut parity = 1.0;
         for (order, row) in weights.iter_mut().enumerate() {
             for k in 0..4 {
@@ -129,10 +129,9 @@ fn curvature_fade(t: f64) -> [f64; 4] {
 
 /// Spline coefficients c₋₁ … cₙ (shifted by one) of many lines at once, not-a-knot at both ends.
 ///
-/// Interpolation asks cᵢ₋₁ + 4cᵢ + cᵢ₊₁ = 6 sᵢ. Not-a-knot
-/// (no jump of the third derivative at node 1) asks δ⁴c₁ = 0, which with the first three equations gives
-/// c₁ = (8s₁ − s₀ − s₂)/6 outright, and likewise at the other end. What is left is tridiagonal and diagonally
-/// dominant; c₀ and c₋₁ follow from the equations at nodes 1 and 0.
+/// Interpolation requires cᵢ₋₁ + 4cᵢ + cᵢ₊₁ = 6 sᵢ. Not-a-knot (no jump of the third derivative at node 1) requires
+/// δ⁴c₁ = 0. With the first three equations this gives c₁ = (8s₁ − s₀ − s₂)/6 directly, and likewise at the other end. The
+/// remaining system is tridiagonal and diagonally dominant; c₀ and c₋₁ follow from the equations at nodes 1 and 0.
 pub(super) struct Interpolation {
     count: usize,
     /// The superdiagonal of the eliminated system for c₂ … cₙ₋₃.

@@ -64,7 +64,7 @@ impl<'a> ForceTangents<'a> {
         Self {
             force: Tangent::force(model, contact, force_node(model, at)),
             by_foothold: Tangent::force_by_foothold(model, contact, foothold, warped),
-            foothold: Tangent::position(model, &contact.point, foothold),
+            foothold: Tangent::foot(model, contact, foothold),
         }
     }
 

@@ -19,7 +19,7 @@ pub struct NodeCurvature {
     pub base_position: Vec<Vector3<f64>>,
     /// ∂L/∂R by sample.
     pub base_rotation: Vec<Matrix3<f64>>,
-    /// ∂L/∂p and ∂L/∂R half way from each sample to the next, as in [`State::base_between`].
+    /// ∂L/∂p and ∂L/∂R halfway from each sample to the next, as in [`State::base_between`].
     pub base_between: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// ∂L/∂p_i, `[foot][stance]`.
     pub contacts: Vec<Vec<Vector3<f64>>>,
@@ -101,7 +101,7 @@ impl NodeCurvature {
         *by_rotation += rotation;
     }
 
-    /// Adds what other terms have added to another one.
+    /// Adds the weights that another instance has accumulated.
     pub fn merge(&mut self, other: &Self) {
         fn sum<T: Copy + std::ops::AddAssign>(to: &mut [T], from: &[T]) {
             to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
@@ -126,12 +126,12 @@ impl NodeCurvature {
     }
 
     /// Adds part `part` of Σ ∂L/∂(node) · ∂²(node)/∂(variables)² to the sink, after all terms have added their weights: 0 the
-    /// base, 1 what is due to switches, 2 the feet.
+    /// base, 1 the nodes that depend on switches, 2 the feet.
     pub fn scatter(&self, part: usize, model: &Model, state: &State, sink: &mut Sink) {
         match part {
             0 => self.scatter_bases(model, state, sink),
             1 => self.scatter_switches(model, state, sink),
-            _ if model.space.is_warped() => self.scatter_feet(model, state, sink),
+            _ if model.spaces.feet.is_warped() => self.scatter_feet(model, state, sink),
             _ => {}
         }
     }
@@ -244,7 +244,7 @@ fn scatter_base(
     let q = by_rotation * base.rotation().transpose();
     let (axis, trace) = (skew_part(&q), q.trace());
     let w = &base.turn.first;
-    let first = if model.space.is_warped() { 0 } else { 3 };
+    let first = if model.spaces.base.is_warped() { 0 } else { 3 };
     for d in first..6 {
         for e in first..=d {
             let mut value =

@@ -89,7 +89,7 @@ pub fn tangents<'a>(model: &'a Model, state: &'a State, (i, at): (usize, Instant
     let (base, node) = (state.base_at(at), model.layout.base_at(at));
     [
         Tangent::turn(model, base, node),
-        Tangent::position(model, &base.point, node),
-        Tangent::position(model, &state.foot(model, i, at).point, state.foot_node(i, at)),
+        Tangent::base(model, base, node),
+        Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at)),
     ]
 }

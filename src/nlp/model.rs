@@ -9,9 +9,7 @@ use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
 use crate::trajectory::layout::KnotSpacing;
-use crate::trajectory::space::Space;
-use crate::trajectory::{Gait, Layout};
-use crate::{Error, Result};
+use crate::trajectory::{Gait, Layout, Spaces};
 
 /// m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -22,7 +20,7 @@ pub const CONE_ROUNDING: f64 = 2e-3;
 /// Least normal force of a standing foot that does not adhere, in m g, away from the switches.
 pub const LEAST_NORMAL_FORCE: f64 = 0.02;
 
-/// Points of the torso's underside at which its clearance is asked for, along x and y.
+/// Points of the torso's underside at which its clearance is constrained, along x and y.
 pub const UNDERSIDE: [usize; 2] = [5, 3];
 
 /// Robot, ground, space and layout. Units of the NLP: m, s, forces in m g, torques in m g · 1 m.
@@ -36,7 +34,7 @@ pub struct Model {
     pub nominal: Vec<Vector3<f64>>,
     /// By foot.
     pub reach: Vec<Box3>,
-    /// By foot, where the robot's file knows it.
+    /// By foot, where the robot's file describes the leg.
     pub legs: Vec<Option<Leg>>,
     /// By foot.
     pub foot_names: Vec<String>,
@@ -46,8 +44,8 @@ pub struct Model {
     pub underside: Vec<Vector3<f64>>,
     /// The ground.
     pub ground: Arc<Heightfield>,
-    /// The space of the variables.
-    pub space: Space,
+    /// The spaces of the variables.
+    pub spaces: Spaces,
     /// The variables.
     pub layout: Layout,
     /// Threads that evaluate derivatives, 1 or 2.
@@ -55,23 +53,16 @@ pub struct Model {
 }
 
 impl Model {
-    /// Puts a scenario together.
+    /// The model of a scenario.
     pub fn new(
         scenario: &Scenario,
         robot: &Robot,
         gait: &Gait,
         ground: Arc<Heightfield>,
-        space: Space,
-    ) -> Result<Self> {
+        spaces: Spaces,
+    ) -> Self {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         let adhesive_feet = &scenario.robot.adhesive_feet;
-        if let Some(unknown) = adhesive_feet.iter().find(|name| !foot_names.contains(name)) {
-            return Err(Error::input(format!(
-                "robot.adhesive_feet: \"{unknown}\" is no foot of {}; its feet are {}",
-                robot.name,
-                foot_names.join(", ")
-            )));
-        }
         let inertia = Matrix3::from_fn(|r, c| robot.inertia[r][c]);
         let along = |i: usize, count: usize| 2.0 * i as f64 / (count - 1) as f64 - 1.0;
         let (center, half) = (robot.torso.center, robot.torso.half_size);
@@ -86,7 +77,7 @@ impl Model {
                 })
             })
             .collect();
-        Ok(Self {
+        Self {
             mass: robot.mass,
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
@@ -96,7 +87,7 @@ impl Model {
             foot_names,
             underside,
             ground,
-            space,
+            spaces,
             threads: scenario.solver.threads,
             layout: Layout::new(
                 gait,
@@ -106,7 +97,7 @@ impl Model {
                     force: scenario.discretization.force_knots,
                 },
             ),
-        })
+        }
     }
 
     /// Number of feet.

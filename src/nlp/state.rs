@@ -33,7 +33,7 @@ impl BaseNode {
     }
 }
 
-/// A foot on or over the ground.
+/// A foot on or above the ground.
 #[derive(Clone, Copy, Debug)]
 pub struct FootNode {
     /// φ of its variables.
@@ -43,20 +43,20 @@ pub struct FootNode {
 }
 
 impl FootNode {
-    /// Vertical distance to the ground, m, and its derivative with respect to the ambient position.
+    /// Height above the ground, m, and its derivative with respect to the ambient position.
     pub fn gap(&self) -> (f64, Vector3<f64>) {
         (self.point.position.z - self.ground.h, Vector3::new(-self.ground.d1[0], -self.ground.d1[1], 1.0))
     }
 }
 
-/// A point of a swing's path, wherever in time that is.
+/// A point of a swing's path, at whatever time the foot passes it.
 #[derive(Clone, Debug)]
 pub struct SwingPoint {
     /// Which swing.
     pub swing: usize,
-    /// Share of the swing that lies before it.
+    /// Fraction of the swing before it.
     pub u: f64,
-    /// It is the middle, where the swing is to be highest.
+    /// Whether it is the middle, where the swing must reach its apex.
     pub apex: bool,
     /// Its variables.
     pub node: LinearNode,
@@ -75,18 +75,18 @@ pub struct State {
     pub contacts: Vec<Vec<FootNode>>,
     /// `swings[foot][k]`; stale where the foot stands.
     pub swings: Vec<Vec<FootNode>>,
-    /// `swings_between[foot][k]`: half way from each sample to the next; empty where the leg's geometry is not known, stale
+    /// `swings_between[foot][k]`: halfway from each sample to the next; empty where the leg's geometry is not known, stale
     /// where the foot stands.
     pub swings_between: Vec<Vec<FootNode>>,
     /// `points[foot]`: the middle of each swing, and where switches are variables more points of its path.
     pub points: Vec<Vec<FootNode>>,
-    /// Which these are.
+    /// Which points these are.
     pub swing_points: Vec<Vec<SwingPoint>>,
     /// `warped_forces[foot][k]`, f̄ in m g.
     pub warped_forces: Vec<Vec<Vector3<f64>>>,
     /// `forces[foot][k]`, f = J f̄ in m g.
     pub forces: Vec<Vec<Vector3<f64>>>,
-    /// `warped_full_forces[foot][k]`, ḡ in m g: the variables that f̄ is a share of, see
+    /// `warped_full_forces[foot][k]`, ḡ in m g: the variables of f̄ = σ ḡ, see
     /// [`crate::trajectory::switches`]. The same as f̄ where durations are given.
     pub warped_full_forces: Vec<Vec<Vector3<f64>>>,
     /// `full_forces[foot][k]`, J ḡ in m g.
@@ -100,7 +100,7 @@ pub struct State {
 }
 
 impl State {
-    /// Room for all nodes of a model.
+    /// Allocates all nodes of a model.
     pub fn new(model: &Model) -> Self {
         let layout = &model.layout;
         let zero = Matrix3::zeros();
@@ -150,22 +150,22 @@ impl State {
         }
     }
 
-    /// Evaluates all nodes at x; with what second derivatives of constraints need when `curved`.
+    /// Evaluates all nodes at x; if `curved`, with what second derivatives of constraints need.
     pub fn update(&mut self, model: &Model, x: &[f64], curved: bool) {
         let layout = &model.layout;
         let order = if curved { Order::Third } else { Order::Second };
         let foot_at = |node: &LinearNode, order: Order| {
-            let point = model.space.jet(&Vector3::from(node.value::<3>(x)), order);
+            let point = model.spaces.feet.jet(&Vector3::from(node.value::<3>(x)), order);
             FootNode { point, ground: model.ground.jet(point.position.x, point.position.y) }
         };
         for (k, node) in layout.base.iter().enumerate() {
             let y = node.value::<6>(x);
-            let (point, turn) = model.space.pose(&y, curved);
+            let (point, turn) = model.spaces.base.pose(&y, curved);
             self.base[k] = BaseNode { point, turn };
             self.base_motion[k] = [y, layout.base_rates[k][0].value(x), layout.base_rates[k][1].value(x)];
         }
         for (between, node) in self.base_between.iter_mut().zip(&layout.base_between) {
-            let (point, turn) = model.space.pose(&node.value::<6>(x), curved);
+            let (point, turn) = model.spaces.base.pose(&node.value::<6>(x), curved);
             *between = BaseNode { point, turn };
         }
         for (i, foot) in layout.feet.iter().enumerate() {
@@ -221,8 +221,7 @@ impl State {
         }
     }
 
-    /// The force f̄ of a foot at a sample in terms of the variables, at the present x, if it may bear something there, and its
-    /// stance.
+    /// The force f̄ of a foot at a sample in terms of the variables, at the present x, if one may act there, and its stance.
     pub fn force_node<'a>(&'a self, model: &Model, foot: usize, k: usize) -> Option<(usize, &'a LinearNode)> {
         let (stance, _) = model.layout.force(foot, k)?;
         self.force_nodes[foot][k].as_ref().map(|timed| (stance, &timed.node))

@@ -6,7 +6,6 @@ use super::model::Model;
 use super::sink::{Differential, Sink};
 use super::state::{BaseNode, FootNode};
 use crate::trajectory::LinearNode;
-use crate::trajectory::space::PointJet;
 
 /// How an ambient vector (a position, a force, the rotation vector of a turn) changes with the components of a node:
 /// component d of the node moves it by `columns[d]`, d in `first..last`.
@@ -22,20 +21,25 @@ pub struct Tangent<'a> {
 }
 
 impl<'a> Tangent<'a> {
-    /// Of φ at a node.
-    pub fn position(model: &Model, point: &PointJet, node: &'a LinearNode) -> Self {
-        Self::matrix(node, &point.jacobian, !model.space.is_warped())
+    /// Of the position of the base.
+    pub fn base(model: &Model, base: &BaseNode, node: &'a LinearNode) -> Self {
+        Self::matrix(node, &base.point.jacobian, !model.spaces.base.is_warped())
     }
 
     /// Of the orientation of the base.
     pub fn turn(model: &Model, base: &BaseNode, node: &'a LinearNode) -> Self {
-        let first = if model.space.is_warped() { 0 } else { 3 };
+        let first = if model.spaces.base.is_warped() { 0 } else { 3 };
         Self { node, columns: base.turn.first, first, last: 6, identity: false }
+    }
+
+    /// Of the position of a foot.
+    pub fn foot(model: &Model, foot: &FootNode, node: &'a LinearNode) -> Self {
+        Self::matrix(node, &foot.point.jacobian, !model.spaces.feet.is_warped())
     }
 
     /// Of a force J f̄ with its own variables.
     pub fn force(model: &Model, contact: &FootNode, node: &'a LinearNode) -> Self {
-        Self::matrix(node, &contact.point.jacobian, !model.space.is_warped())
+        Self::matrix(node, &contact.point.jacobian, !model.spaces.feet.is_warped())
     }
 
     /// Of a force J f̄ with its foothold; empty where J is constant.
@@ -49,7 +53,8 @@ impl<'a> Tangent<'a> {
         for d in 0..3 {
             columns[d] = contact.point.first[d] * warped;
         }
-        Self { node, columns, first: 0, last: if model.space.is_warped() { 3 } else { 0 }, identity: false }
+        let last = if model.spaces.feet.is_warped() { 3 } else { 0 };
+        Self { node, columns, first: 0, last, identity: false }
     }
 
     fn matrix(node: &'a LinearNode, matrix: &Matrix3<f64>, identity: bool) -> Self {

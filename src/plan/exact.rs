@@ -1,23 +1,24 @@
-//! The motion of a plan at any time, exactly: the splines that were optimised, not its samples.
+//! The motion of a plan at any time, exactly: the splines that were optimized, not its samples.
+
+use std::sync::Arc;
 
 use super::{NamedArray, Plan};
 use crate::heightfield::Heightfield;
 use crate::trajectory::layout::Layout;
 use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
-use crate::trajectory::space::Space;
 use crate::trajectory::switches::snapped;
-use crate::trajectory::{Gait, Swing};
+use crate::trajectory::{Gait, Spaces, Swing};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
-/// Times this much outside the plan, s, are taken for its ends.
+/// Times outside the plan by less than this, s, are moved to its ends.
 const TIME_TOLERANCE: f64 = 1e-9;
 
-/// A plan's splines, put together again as the variables they were, with forces in N.
+/// A plan's splines, reassembled as the variables of the NLP, with forces in N.
 #[derive(Clone, Debug)]
 pub struct ExactMotion {
     layout: Layout,
-    space: Space,
+    spaces: Spaces,
     x: Vec<f64>,
 }
 
@@ -37,7 +38,7 @@ impl ExactMotion {
     /// # Errors
     /// For a time outside the plan.
     pub fn base(&self, t: f64) -> Result<BaseMotion> {
-        Ok(sampling::base(&self.layout, &self.space, &self.x, self.sample(t)?))
+        Ok(sampling::base(&self.layout, &self.spaces.base, &self.x, self.sample(t)?))
     }
 
     /// Foot `i` at `t` in s, world frame, its forces in N.
@@ -48,14 +49,14 @@ impl ExactMotion {
         if i >= self.feet() {
             return Err(Error::input(format!("foot {i}: the plan has {} feet, counted from 0", self.feet())));
         }
-        Ok(sampling::foot(&self.layout, &self.space, &self.x, i, self.sample(t)?))
+        Ok(sampling::foot(&self.layout, &self.spaces.feet, &self.x, i, self.sample(t)?))
     }
 
     /// A time in samples of the NLP; near a sample it is that sample, where a foot's phase may switch.
     fn sample(&self, t: f64) -> Result<f64> {
         let end = self.duration();
         if !(-TIME_TOLERANCE..=end + TIME_TOLERANCE).contains(&t) {
-            return Err(Error::input(format!("t = {t} s: the plan goes from 0 to {end} s")));
+            return Err(Error::input(format!("t = {t} s: the plan lasts from 0 to {end} s")));
         }
         let k = t / self.layout.time_step;
         let near = k.round();
@@ -118,19 +119,16 @@ impl Plan {
         }
         // The first three control points are one variable, and so are the last three.
         if let Some(i) = (0..points).find(|&i| x[layout.base_block(i)..][..6] != base[6 * i..6 * i + 6]) {
-            let what = format!(
-                "control point {i} differs from its neighbour; the motion must start and end at rest"
-            );
+            let what =
+                format!("control point {i} differs from its neighbor; the motion must start and end at rest");
             return Err(wrong("base_control_points", what));
         }
         for foot in 0..self.foot_names.len() {
             self.fill_foot(&layout, foot, &mut x)?;
         }
-        let space = match &self.map {
-            None => Space::Direct,
-            Some(grid) => Space::Warped(Box::new(WarpMap::from_grid(grid)?)),
-        };
-        Ok(ExactMotion { layout, space, x })
+        let map = self.map.as_ref().map(|grid| WarpMap::from_grid(grid).map(Arc::new)).transpose()?;
+        let spaces = Spaces::of(self.meta.formulation, map)?;
+        Ok(ExactMotion { layout, spaces, x })
     }
 
     /// The ground as planned on, as the spline it was.
@@ -148,7 +146,7 @@ impl Plan {
             let member = format!("{name}_{what}");
             let (shape, values) = self.spline(&member)?;
             if shape != expected {
-                return Err(wrong(&member, format!("shape {shape:?}, the phases ask for {expected:?}")));
+                return Err(wrong(&member, format!("shape {shape:?}, the phases require {expected:?}")));
             }
             Ok(values)
         };
@@ -178,7 +176,7 @@ impl Plan {
     fn spline(&self, name: &str) -> Result<(&[usize], &[f64])> {
         let found: Option<&NamedArray> = self.splines.iter().find(|(member, ..)| member == name);
         let (_, shape, values) = found.ok_or_else(|| {
-            wrong(name, "is missing; without it there are the plan's samples only, no motion between them")
+            wrong(name, "is missing; without it the plan has only its samples, no motion between them")
         })?;
         if shape.iter().product::<usize>() != values.len() {
             return Err(wrong(name, format!("{} values for the shape {shape:?}", values.len())));
@@ -192,7 +190,7 @@ fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Re
     let refuse = |what: String| Err(Error::input(format!("member phase_durations of {foot}: {what}")));
     if durations.len().is_multiple_of(2) {
         return refuse(format!(
-            "{} phases; stance is first and last, so their number is odd",
+            "{} phases; the number must be odd, because the first and the last one are stances",
             durations.len()
         ));
     }

@@ -1,4 +1,4 @@
-//! The plan: what comes out, sampled in ambient space and exact (`NAME.plan.npz`, schema 1).
+//! The plan: the result, sampled in ambient space and as exact splines (`NAME.plan.npz`, schema 1).
 
 pub mod exact;
 mod read;
@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::planner::Seconds;
 use crate::robot::Box3;
+use crate::scenario::Formulation;
 use crate::warp::MapGrid;
 
 /// Name, shape, values in C order.
@@ -21,7 +22,7 @@ pub type NamedArray = (String, Vec<usize>, Vec<f64>);
 pub struct Plan {
     /// (N,) s.
     pub t: Vec<f64>,
-    /// (N,) centre of mass, m.
+    /// (N,) center of mass, m.
     pub base_position: Vec<[f64; 3]>,
     /// (N,) body to world, w x y z.
     pub base_quaternion_wxyz: Vec<[f64; 4]>,
@@ -72,14 +73,21 @@ pub struct Plan {
 /// Warped-space counterparts of the samples.
 #[derive(Clone, Debug)]
 pub struct WarpedSamples {
-    /// (N,)
-    pub base_position: Vec<[f64; 3]>,
-    /// (N,) ZYX Euler angles θ̄ as (roll, pitch, yaw), rad.
-    pub base_euler: Vec<[f64; 3]>,
+    /// Those of the base, where it was planned in F.
+    pub base: Option<WarpedBase>,
     /// (N·E,)
     pub foot_position: Vec<[f64; 3]>,
     /// (N·E,) N.
     pub foot_force: Vec<[f64; 3]>,
+}
+
+/// Warped-space counterparts of the base's samples.
+#[derive(Clone, Debug)]
+pub struct WarpedBase {
+    /// (N,)
+    pub position: Vec<[f64; 3]>,
+    /// (N,) ZYX Euler angles θ̄ as (roll, pitch, yaw), rad.
+    pub euler: Vec<[f64; 3]>,
 }
 
 /// A raster of heights: `heightfield[row * columns + column]`, rows along y, columns along x.
@@ -95,7 +103,7 @@ pub struct GroundGrid {
     pub spacing: [f64; 2],
     /// Heights, m.
     pub height: Vec<f64>,
-    /// The same grid before smoothing, where the input was a raster or mesh.
+    /// The same grid before smoothing, where the input was a raster.
     pub raw: Option<Vec<f64>>,
 }
 
@@ -108,12 +116,18 @@ pub struct Meta {
     pub warpgait_version: String,
     /// RFC 3339.
     pub created: String,
-    /// `warped` or `direct`.
-    pub formulation: String,
-    /// Samples a second.
+    /// The space of the variables.
+    pub formulation: Formulation,
+    /// Samples per second.
     pub sample_rate_hz: f64,
     /// The whole scenario, overrides included, as TOML.
     pub scenario: String,
+    /// The scenario as the user wrote it; empty in plans of version 0.1.0 and before.
+    #[serde(default)]
+    pub scenario_source: String,
+    /// Values set from the command line or from Python, each `key=value`.
+    #[serde(default)]
+    pub overrides: Vec<String>,
     /// The robot as planned with.
     pub robot: MetaRobot,
     /// The limits as planned with; missing in plans of version 0.1.0 and before.
@@ -121,7 +135,7 @@ pub struct Meta {
     pub limits: Option<MetaLimits>,
     /// How the solve went.
     pub solver: MetaSolver,
-    /// What the check said.
+    /// The results of the check.
     pub checks: Vec<CheckRow>,
     /// File name → SHA-256.
     pub inputs: std::collections::BTreeMap<String, String>,
@@ -134,7 +148,7 @@ pub struct MetaRobot {
     pub name: String,
     /// kg.
     pub mass: f64,
-    /// kg m², about the centre of mass, base frame.
+    /// kg m², about the center of mass, base frame.
     pub inertia: [[f64; 3]; 3],
     /// ν.
     pub friction: f64,
@@ -166,7 +180,7 @@ pub struct MetaLimits {
 /// `meta.solver`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MetaSolver {
-    /// In words.
+    /// How the solve ended, in words.
     pub status: String,
     /// Every constraint of the NLP holds to the tolerance.
     pub success: bool,
@@ -183,11 +197,11 @@ pub struct MetaSolver {
 pub struct CheckRow {
     /// Which law.
     pub name: String,
-    /// What was found, at its worst.
+    /// Its worst value.
     pub value: f64,
     /// Its unit.
     pub unit: String,
-    /// The largest value allowed.
+    /// The largest allowed value.
     pub limit: f64,
     /// Verdict: value ≤ limit.
     pub passed: bool,

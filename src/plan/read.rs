@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{GroundGrid, Meta, NamedArray, Plan, WarpedSamples};
+use super::{GroundGrid, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
 use crate::Result;
 use crate::files::npz::NpzReader;
 use crate::warp::MapGrid;
@@ -15,7 +15,7 @@ impl Plan {
     /// wrong shape or dtype, a value that is not finite, a newer schema, a file cut short.
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = NpzReader::open(path)?;
-        // First, so that a plan of a newer schema is refused as such and not for what that schema changed.
+        // First, so that a newer schema is refused as such and not for what it changed.
         let meta = read_meta(&mut npz)?;
 
         let (shape, t) = npz.finite_f64("t")?;
@@ -37,16 +37,7 @@ impl Plan {
             );
         }
 
-        let warped = if npz.has("warped_base_position") {
-            Some(WarpedSamples {
-                base_position: npz.points("warped_base_position", &[n])?,
-                base_euler: npz.points("warped_base_euler", &[n])?,
-                foot_position: npz.points("warped_foot_position", &[n, e])?,
-                foot_force: npz.points("warped_foot_force", &[n, e])?,
-            })
-        } else {
-            None
-        };
+        let warped = if npz.has("warped_foot_position") { Some(read_warped(&mut npz, n, e)?) } else { None };
 
         let (shape, history_objective) = npz.finite_f64("history_objective")?;
         let iterations = history_objective.len();
@@ -164,6 +155,23 @@ fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
         spacing: [spacing[0], spacing[1]],
         height,
         raw,
+    })
+}
+
+/// The warped samples; those of the base are missing where it was planned in ambient space.
+fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<WarpedSamples> {
+    let base = if npz.has("warped_base_position") {
+        Some(WarpedBase {
+            position: npz.points("warped_base_position", &[n])?,
+            euler: npz.points("warped_base_euler", &[n])?,
+        })
+    } else {
+        None
+    };
+    Ok(WarpedSamples {
+        base,
+        foot_position: npz.points("warped_foot_position", &[n, e])?,
+        foot_force: npz.points("warped_foot_force", &[n, e])?,
     })
 }
 

@@ -1,35 +1,32 @@
-//! A plan from a motion: everything at ten times the rate of the NLP's samples, in ambient space.
+//! A plan from a motion: everything at ten times the sample rate of the NLP, in ambient space.
 
-use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 
-use super::{GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, Plan, WarpedSamples};
+use super::{
+    GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedBase, WarpedSamples,
+};
+use crate::ipopt::IterationRecord;
+use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
-use crate::robot::Robot;
-use crate::scenario::{Formulation, Scenario};
+use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::Ground;
+use crate::trajectory::layout::{FootVariables, Layout};
 use crate::trajectory::sampling;
-use crate::trajectory::space::Space;
+use crate::warp::WarpMap;
 
 /// Samples of a plan within one time step.
 pub const SAMPLES_A_STEP: usize = 10;
 
 /// What a plan carries besides the motion.
 pub struct Provenance<'a> {
-    /// The scenario.
-    pub scenario: &'a Scenario,
-    /// The scenario's text.
-    pub text: &'a str,
-    /// The robot.
-    pub robot: &'a Robot,
+    /// The scenario with its robot and its files.
+    pub loaded: &'a LoadedScenario,
     /// The ground.
     pub ground: &'a Ground,
-    /// Files that went in, by name, with their SHA-256.
-    pub inputs: BTreeMap<String, String>,
-    /// s spent on the map.
+    /// Time spent on the map, s.
     pub map_seconds: f64,
 }
 
@@ -37,21 +34,16 @@ impl Plan {
     /// Samples a motion. `checks` are left empty.
     pub fn from_motion(motion: &Motion, provenance: &Provenance) -> Self {
         let (model, x) = (&motion.model, &motion.x);
-        let (layout, space) = (&model.layout, &model.space);
+        let (layout, spaces) = (&model.layout, &model.spaces);
         let count = layout.intervals * SAMPLES_A_STEP + 1;
         let unit = model.mass * GRAVITY;
-        let warped = space.is_warped();
         let mut plan = Self::empty(motion, provenance);
-        let mut samples = WarpedSamples {
-            base_position: vec![],
-            base_euler: vec![],
-            foot_position: vec![],
-            foot_force: vec![],
-        };
+        let mut base_in_f = WarpedBase { position: vec![], euler: vec![] };
+        let mut feet_in_f = WarpedSamples { base: None, foot_position: vec![], foot_force: vec![] };
         let mut quaternion = [1.0, 0.0, 0.0, 0.0];
         for n in 0..count {
             let k = n as f64 / SAMPLES_A_STEP as f64;
-            let base = sampling::base(layout, space, x, k);
+            let base = sampling::base(layout, &spaces.base, x, k);
             quaternion = base.quaternion_wxyz(quaternion);
             plan.t.push(k * layout.time_step);
             plan.base_position.push(base.position.into());
@@ -61,42 +53,29 @@ impl Plan {
             plan.base_angular_velocity.push(base.angular_velocity.into());
             plan.base_angular_acceleration.push(base.angular_acceleration.into());
             let [px, py, pz, roll, pitch, yaw] = base.variables;
-            samples.base_position.push([px, py, pz]);
-            samples.base_euler.push([roll, pitch, yaw]);
+            base_in_f.position.push([px, py, pz]);
+            base_in_f.euler.push([roll, pitch, yaw]);
             for i in 0..model.feet() {
-                let foot = sampling::foot(layout, space, x, i, k);
+                let foot = sampling::foot(layout, &spaces.feet, x, i, k);
                 plan.foot_position.push(foot.position.into());
                 plan.foot_velocity.push(foot.velocity.into());
                 plan.foot_acceleration.push(foot.acceleration.into());
                 plan.foot_force.push((foot.force * unit).into());
                 plan.foot_contact.push(foot.contact);
                 plan.foot_normal.push(model.ground.normal(foot.position.x, foot.position.y));
-                samples.foot_position.push(foot.warped_position.into());
-                samples.foot_force.push((foot.warped_force * unit).into());
+                feet_in_f.foot_position.push(foot.warped_position.into());
+                feet_in_f.foot_force.push((foot.warped_force * unit).into());
             }
         }
-        plan.warped = warped.then_some(samples);
+        feet_in_f.base = spaces.base.is_warped().then_some(base_in_f);
+        plan.warped = spaces.feet.is_warped().then_some(feet_in_f);
         plan
     }
 
     /// Everything but the samples.
     fn empty(motion: &Motion, provenance: &Provenance) -> Self {
-        let (model, scenario, robot) = (&motion.model, provenance.scenario, provenance.robot);
-        let field = &provenance.ground.field;
-        let grid = field.grid();
-        let step = model.layout.time_step;
-        let phase_durations = model
-            .layout
-            .feet
-            .iter()
-            .map(|foot| {
-                let edges: Vec<f64> =
-                    foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
-                edges.windows(2).map(|e| (e[1] - e[0]) * step).collect()
-            })
-            .collect();
-        let history =
-            |value: fn(&crate::ipopt::IterationRecord) -> f64| motion.history.iter().map(value).collect();
+        let model = &motion.model;
+        let history = |value: fn(&IterationRecord) -> f64| motion.history.iter().map(value).collect();
         Self {
             t: vec![],
             base_position: vec![],
@@ -114,69 +93,95 @@ impl Plan {
             foot_names: model.foot_names.clone(),
             foot_adhesive: model.adhesive.clone(),
             warped: None,
-            phase_durations,
+            phase_durations: phase_durations(&model.layout),
             splines: splines(motion),
-            ground: GroundGrid {
-                rows: grid.rows,
-                columns: grid.columns,
-                origin: grid.origin,
-                spacing: grid.spacing,
-                height: field.samples().to_vec(),
-                raw: provenance.ground.raw.clone(),
-            },
-            map: match &model.space {
-                Space::Direct => None,
-                Space::Warped(map) => Some(map.to_grid()),
-            },
+            ground: ground_grid(provenance.ground),
+            map: model.spaces.map().map(WarpMap::to_grid),
             history_objective: history(|r| r.objective),
             history_constraint_violation: history(|r| r.violation),
             history_seconds: history(|r| r.seconds),
-            meta: Meta {
-                schema: 1,
-                warpgait_version: env!("CARGO_PKG_VERSION").into(),
-                created: rfc3339(SystemTime::now()),
-                formulation: match scenario.formulation {
-                    Formulation::Warped => "warped".into(),
-                    Formulation::Direct => "direct".into(),
-                },
-                sample_rate_hz: SAMPLES_A_STEP as f64 / step,
-                scenario: provenance.text.into(),
-                robot: MetaRobot {
-                    name: robot.name.clone(),
-                    mass: robot.mass,
-                    inertia: robot.inertia,
-                    friction: scenario.contact.friction,
-                    gravity: [0.0, 0.0, -GRAVITY],
-                    reach: model.reach.clone(),
-                    torso: robot.torso,
-                },
-                limits: Some(MetaLimits {
-                    force_limit: scenario.motion.force_limit,
-                    pull_limit: scenario.motion.pull_limit,
-                    swing_clearance: scenario.motion.swing_clearance,
-                    base_clearance: scenario.motion.base_clearance,
-                    friction: scenario.contact.friction,
-                    friction_margin: scenario.contact.friction_margin,
-                }),
-                solver: MetaSolver {
-                    status: motion.status.clone(),
-                    success: motion.solved,
-                    iterations: motion.iterations,
-                    max_violation: motion.max_violation(),
-                    seconds: Seconds {
-                        map: provenance.map_seconds,
-                        total: motion.seconds.total + provenance.map_seconds,
-                        ..motion.seconds
-                    },
-                },
-                checks: vec![],
-                inputs: provenance.inputs.clone(),
-            },
+            meta: meta(motion, provenance),
         }
     }
 }
 
-/// The variables by set, in the space they were optimised in (forces in N), with the knots of each spline.
+/// Stance and swing durations by foot, s.
+fn phase_durations(layout: &Layout) -> Vec<Vec<f64>> {
+    let of = |foot: &FootVariables| {
+        let edges: Vec<f64> = foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
+        edges.windows(2).map(|e| (e[1] - e[0]) * layout.time_step).collect()
+    };
+    layout.feet.iter().map(of).collect()
+}
+
+fn ground_grid(ground: &Ground) -> GroundGrid {
+    let grid = ground.field.grid();
+    GroundGrid {
+        rows: grid.rows,
+        columns: grid.columns,
+        origin: grid.origin,
+        spacing: grid.spacing,
+        height: ground.field.samples().to_vec(),
+        raw: ground.raw.clone(),
+    }
+}
+
+fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
+    let (model, loaded) = (&motion.model, provenance.loaded);
+    let scenario = &loaded.scenario;
+    Meta {
+        schema: PLAN_SCHEMA,
+        warpgait_version: env!("CARGO_PKG_VERSION").into(),
+        created: rfc3339(SystemTime::now()),
+        formulation: scenario.formulation,
+        sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,
+        scenario: loaded.effective_text.clone(),
+        scenario_source: loaded.source_text.clone(),
+        overrides: loaded.overrides.clone(),
+        robot: meta_robot(model, loaded),
+        limits: Some(limits(scenario)),
+        solver: MetaSolver {
+            status: motion.status.clone(),
+            success: motion.solved,
+            iterations: motion.iterations,
+            max_violation: motion.max_violation(),
+            seconds: Seconds {
+                map: provenance.map_seconds,
+                total: motion.seconds.total + provenance.map_seconds,
+                ..motion.seconds
+            },
+        },
+        checks: vec![],
+        inputs: loaded.inputs.iter().chain(&provenance.ground.inputs).cloned().collect(),
+    }
+}
+
+fn meta_robot(model: &Model, loaded: &LoadedScenario) -> MetaRobot {
+    let robot = &loaded.robot;
+    MetaRobot {
+        name: robot.name.clone(),
+        mass: robot.mass,
+        inertia: robot.inertia,
+        friction: loaded.scenario.contact.friction,
+        gravity: [0.0, 0.0, -GRAVITY],
+        reach: model.reach.clone(),
+        torso: robot.torso,
+    }
+}
+
+fn limits(scenario: &Scenario) -> MetaLimits {
+    let (motion, contact) = (&scenario.motion, &scenario.contact);
+    MetaLimits {
+        force_limit: motion.force_limit,
+        pull_limit: motion.pull_limit,
+        swing_clearance: motion.swing_clearance,
+        base_clearance: motion.base_clearance,
+        friction: contact.friction,
+        friction_margin: contact.friction_margin,
+    }
+}
+
+/// The variables by set, in the space they were optimized in (forces in N), with the knots of each spline.
 fn splines(motion: &Motion) -> Vec<(String, Vec<usize>, Vec<f64>)> {
     let (model, x) = (&motion.model, &motion.x);
     let layout = &model.layout;

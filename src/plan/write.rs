@@ -30,8 +30,10 @@ impl Plan {
         npz.add_bool("foot_adhesive", &[e], &self.foot_adhesive)?;
 
         if let Some(warped) = &self.warped {
-            npz.add_points("warped_base_position", &[n], &warped.base_position)?;
-            npz.add_points("warped_base_euler", &[n], &warped.base_euler)?;
+            if let Some(base) = &warped.base {
+                npz.add_points("warped_base_position", &[n], &base.position)?;
+                npz.add_points("warped_base_euler", &[n], &base.euler)?;
+            }
             npz.add_points("warped_foot_position", &[n, e], &warped.foot_position)?;
             npz.add_points("warped_foot_force", &[n, e], &warped.foot_force)?;
         }
@@ -96,8 +98,8 @@ impl Plan {
         ]
     }
 
-    /// Whether every array has its length and every value is finite: what the reader would refuse is an error of the
-    /// program, and better met before the file is there.
+    /// Refuses arrays of the wrong length and values that are not finite: the reader would refuse them, so it is better to fail
+    /// before the file exists.
     pub(crate) fn ensure_sound(&self) -> Result<()> {
         let (n, e) = (self.t.len(), self.foot_names.len());
         let base = self.base_members().map(|(name, values)| (name, n, values));
@@ -115,12 +117,10 @@ impl Plan {
         ensure("foot_adhesive", self.foot_adhesive.len() == e, [])?;
         ensure("phase_durations", self.phase_durations.len() == e, self.phase_durations.iter().flatten())?;
         if let Some(warped) = &self.warped {
-            ensure(
-                "warped_base_position",
-                warped.base_position.len() == n,
-                warped.base_position.iter().flatten(),
-            )?;
-            ensure("warped_base_euler", warped.base_euler.len() == n, warped.base_euler.iter().flatten())?;
+            if let Some(base) = &warped.base {
+                ensure("warped_base_position", base.position.len() == n, base.position.iter().flatten())?;
+                ensure("warped_base_euler", base.euler.len() == n, base.euler.iter().flatten())?;
+            }
             ensure(
                 "warped_foot_position",
                 warped.foot_position.len() == n * e,

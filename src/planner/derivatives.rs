@@ -22,7 +22,8 @@ pub struct DerivativeError {
 const STEP: f64 = 1e-5;
 /// Finer one for second derivatives, where the first cannot tell.
 const FINER_STEP: f64 = 1e-6;
-/// Disagreement of a second derivative that calls for other differences: more than the step's own error, less than any test allows.
+/// A second derivative that disagrees by more than this is compared with one-sided differences too: more than the step's own
+/// error, less than any test allows.
 const SUSPICIOUS: f64 = 1e-7;
 /// A difference larger than this, where the pattern has no entry, is a missing entry.
 const NOISE: f64 = 1e-6;
@@ -32,7 +33,7 @@ pub fn check(problem: &mut GaitProblem, x: &[f64], variables: &[usize]) -> Vec<D
     check_with(problem, x, variables, |_| {}, |_| {})
 }
 
-/// The same, with the values of the Jacobian and of the Hessian changed before they are looked at: to see that the check sees.
+/// The same, with the values of the Jacobian and of the Hessian changed first, to test that the comparison notices.
 pub fn check_with(
     problem: &mut GaitProblem,
     x: &[f64],
@@ -45,7 +46,7 @@ pub fn check_with(
         (r.to_vec(), c.to_vec())
     };
     let m = problem.num_constraints();
-    // Poisoned: an entry that is not written shows.
+    // Poisoned, so that an entry that is not written is noticed.
     let mut values = vec![f64::NAN; rows.len()];
     problem.jacobian_values(x, true, &mut values);
     tamper(&mut values);
@@ -103,8 +104,9 @@ pub fn check_with(
 /// The Hessian of the Lagrangian with fixed arbitrary multipliers against differences of its gradient.
 ///
 /// Third derivatives of the ground and of the map are in it, and they jump by J at knots: if one is at a distance d < step, the central
-/// difference is off by J/2 (1 − d/step), and a smaller step only makes that rarer. The difference to the other side sees no knot. So
-/// where the central one disagrees, those to both sides are asked as well, and the nearest counts; a wrong derivative disagrees with all.
+/// difference is off by J/2 (1 − d/step), and a smaller step only makes that rarer. The one-sided difference away from the knot
+/// is not affected. So where the central one disagrees, both one-sided ones are taken as well, and the nearest counts; a wrong
+/// derivative disagrees with all three.
 fn check_hessian(
     problem: &mut GaitProblem,
     x: &[f64],

@@ -55,8 +55,8 @@ impl<'a> BasePath<'a> {
         let pose = |xy: [f64; 2], yaw: f64| standing_pose(&model.nominal, &model.ground, xy, yaw);
         let start = pose(scenario.start.position, yaw);
         ensure_reach(model, &start, scenario.start.position)?;
-        let first = pulled_back(&model.space, &start)?;
-        let mut last = pulled_back(&model.space, &pose(scenario.goal.position, goal_yaw))?;
+        let first = pulled_back(&model.spaces.base, &start)?;
+        let mut last = pulled_back(&model.spaces.base, &pose(scenario.goal.position, goal_yaw))?;
         last[5] = first[5] + wrapped(last[5] - first[5]);
 
         let horizon = layout.intervals as f64 * layout.time_step;
@@ -72,7 +72,7 @@ impl<'a> BasePath<'a> {
     fn at(&self, t: f64) -> [f64; 6] {
         let [first, last] = &self.ends;
         let u = progress(t, self.travel[0], self.travel[1]);
-        if self.model.space.is_warped() {
+        if self.model.spaces.base.is_warped() {
             // A straight line in F; the ground is flat there.
             return std::array::from_fn(|d| first[d] + u * (last[d] - first[d]));
         }
@@ -85,7 +85,7 @@ impl<'a> BasePath<'a> {
     }
 }
 
-/// Heading at the start: the scenario's, or towards the goal.
+/// Heading at the start: the scenario's, or toward the goal.
 pub fn start_yaw(scenario: &Scenario) -> f64 {
     scenario.start.yaw.unwrap_or_else(|| {
         let d = [0, 1].map(|c| scenario.goal.position[c] - scenario.start.position[c]);
@@ -157,7 +157,7 @@ fn set_swings(apex: f64, footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut
             for c in 0..SWING_CONTROL_POINTS {
                 let fraction = (c + 1) as f64 / (SWING_CONTROL_POINTS + 1) as f64;
                 let mut point = ends[0] + (ends[1] - ends[0]) * fraction;
-                point.z = if model.space.is_warped() {
+                point.z = if model.spaces.feet.is_warped() {
                     apex
                 } else {
                     apex + point.z.max(model.ground.height(point.x, point.y))
@@ -173,7 +173,7 @@ fn set_forces(footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut [f64]) {
     let bearing = bearing_feet(model);
     for (foot, footholds) in model.layout.feet.iter().zip(footholds) {
         for (stance, foothold) in foot.stances.iter().zip(footholds) {
-            let jacobian = model.space.jet(foothold, Order::First).jacobian;
+            let jacobian = model.spaces.feet.jet(foothold, Order::First).jacobian;
             let up = jacobian
                 .try_inverse()
                 .map_or_else(Vector3::z, |inverse: Matrix3<f64>| inverse * Vector3::z());
@@ -205,20 +205,27 @@ fn bearing_feet(model: &Model) -> Vec<f64> {
 
 /// Where foot `i` would stand under a base with variables y, in the space of the variables.
 fn foothold_under(model: &Model, i: usize, y: &[f64; 6]) -> Vector3<f64> {
-    let (point, turn) = model.space.pose(y, false);
+    let (point, turn) = model.spaces.base.pose(y, false);
     let q = point.position + turn.rotation * model.nominal[i];
-    match &model.space {
+    match &model.spaces.feet {
         Space::Direct => Vector3::new(q.x, q.y, model.ground.height(q.x, q.y)),
         Space::Warped(map) => {
-            // Nominal as seen in F, scaled as lengths are there, if the ambient point has no preimage.
-            let [x, y] = map.ground_inverse([q.x, q.y]).unwrap_or_else(|_| {
-                let scale = point.jacobian.determinant().abs().cbrt();
-                let offset = euler(&Vector3::new(0.0, 0.0, y[5])).rotation * model.nominal[i] / scale;
-                [y[0] + offset.x, y[1] + offset.y]
-            });
+            let [x, y] = map.ground_inverse([q.x, q.y]).unwrap_or_else(|_| without_preimage(model, i, y, &q));
             Vector3::new(x, y, 0.0)
         }
     }
+}
+
+/// A place in F for a foothold q that has no preimage, such as one outside the map's box: with the base in F, the nominal offset
+/// scaled like lengths there; else q itself.
+fn without_preimage(model: &Model, i: usize, y: &[f64; 6], q: &Vector3<f64>) -> [f64; 2] {
+    if !model.spaces.base.is_warped() {
+        return [q.x, q.y];
+    }
+    let jacobian = model.spaces.base.jet(&Vector3::new(y[0], y[1], y[2]), Order::First).jacobian;
+    let scale = jacobian.determinant().abs().cbrt();
+    let offset = euler(&Vector3::new(0.0, 0.0, y[5])).rotation * model.nominal[i] / scale;
+    [y[0] + offset.x, y[1] + offset.y]
 }
 
 fn wrapped(angle: f64) -> f64 {

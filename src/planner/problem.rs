@@ -29,14 +29,14 @@ use crate::nlp::sink::{Gradient, Pattern, Sink};
 use crate::nlp::{Constraint, Cost, Model, State};
 
 /// The objective is this times the scenario's costs: Ipopt's tests of optimality are absolute, and with an objective of the
-/// order of one it takes a third of the iterations (rippled, medium: 25 instead of 65).
+/// order of one a solve takes a third of the iterations (rippled, medium: 25 instead of 65).
 const COST_SCALE: f64 = 1e3;
-/// Weight of the swings' acceleration, of that of the base's.
+/// Weight of the swings' acceleration, relative to that of the base's.
 const SWING_WEIGHT: f64 = 1e-3;
-/// Weight of the posture, of that of the base's acceleration, s⁻⁴.
+/// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
 const POSTURE_WEIGHT: f64 = 100.0;
 
-/// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper.
+/// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper: Eq. 1 in the direct formulation, Eq. 7 in the warped one.
 pub struct GaitProblem {
     /// What stays the same.
     pub model: Model,
@@ -48,7 +48,7 @@ pub struct GaitProblem {
     jacobian: Pattern,
     jacobian_split: ThreadSplit,
     hessian: Option<LagrangianHessian>,
-    /// The last x, and whether the second derivatives of the nodes are there.
+    /// The last x, and whether the second derivatives of the nodes were evaluated there.
     evaluated: Vec<f64>,
     curved: bool,
     initial: Vec<f64>,
@@ -74,7 +74,7 @@ impl GaitProblem {
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
-                Law::Pcdm => Box::new(Dynamics::centred(intervals)),
+                Law::Pcdm => Box::new(Dynamics::centered(intervals)),
                 Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
             Box::new(Reach::new(&model)),
@@ -179,7 +179,7 @@ impl GaitProblem {
         self.costs.iter().map(|c| &**c as &dyn Cost)
     }
 
-    /// Evaluates the nodes at x, unless they are there.
+    /// Evaluates the nodes at x, unless they already are.
     pub fn update(&mut self, x: &[f64], curved: bool) {
         if (curved && !self.curved) || self.evaluated != x {
             self.state.update(&self.model, x, curved);
@@ -225,15 +225,15 @@ impl GaitProblem {
     }
 }
 
-/// The base's first control points are pinned; switches stay within their rooms; in F, the free control points of a swing stay
-/// above the ground: z̄ ≥ 0 holds for a spline whose control points obey it (Eq. 8, second line, at every instant).
+/// The base's first control points are pinned. Switches stay within their rooms. In F, the free control points of a swing stay
+/// above the ground: a spline obeys z̄ ≥ 0 at every instant if its control points do (Eq. 8, second line).
 fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
     let mut upper = vec![f64::INFINITY; model.layout.variables];
     lower[..6].copy_from_slice(&initial[..6]);
     upper[..6].copy_from_slice(&initial[..6]);
     for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
-        if model.space.is_warped() {
+        if model.spaces.feet.is_warped() {
             for c in 0..SWING_CONTROL_POINTS {
                 lower[swing.control_points + 3 * c + 2] = 0.0;
             }
@@ -277,8 +277,8 @@ impl Terms<'_> {
     }
 }
 
-/// The LagrangianHessian of the Lagrangian and how it is shared: first all terms, each thread with a sum of its own of the nodes' weights,
-/// then, as further parts of the pattern, the nodes.
+/// The Hessian of the Lagrangian and its thread split: first all terms, while each thread accumulates the nodes' weights on its
+/// own; then, as further parts of the pattern, the nodes.
 struct LagrangianHessian {
     pattern: Pattern,
     terms: ThreadSplit,

@@ -16,8 +16,7 @@ use crate::ipopt::{self, IterationRecord, Status};
 use crate::nlp::Model;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
-use crate::trajectory::Gait;
-use crate::trajectory::space::Space;
+use crate::trajectory::{Gait, Spaces};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
@@ -37,21 +36,16 @@ pub struct Task<'a> {
     pub gait: &'a Gait,
     /// Its ground.
     pub ground: &'a Arc<Heightfield>,
-    /// The map over that ground, for the warped formulation.
+    /// The map over that ground, for all formulations but the direct one.
     pub map: Option<&'a WarpMap>,
 }
 
 impl Task<'_> {
     /// The model over the whole terrain.
     fn model(&self) -> Result<Model> {
-        let space = match (self.scenario.formulation, self.map) {
-            (Formulation::Direct, _) => Space::Direct,
-            (Formulation::Warped, Some(map)) => Space::Warped(Box::new(map.clone())),
-            (Formulation::Warped, None) => {
-                return Err(Error::Internal("the warped formulation needs a map".into()));
-            }
-        };
-        Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), space)
+        let map = self.map.map(|map| Arc::new(map.clone()));
+        let spaces = Spaces::of(self.scenario.formulation, map)?;
+        Ok(Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), spaces))
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -65,7 +59,7 @@ impl Task<'_> {
     }
 }
 
-/// An iteration, for people who wait.
+/// An iteration, for progress displays.
 #[derive(Clone, Debug)]
 pub struct Progress<'a> {
     /// What is being solved.
@@ -159,9 +153,9 @@ impl<'a> Solve<'a> {
 
     /// Solves from the guess with at most `budget` iterations.
     ///
-    /// Where legs are known, first to a feasible point without their joints, whose speeds and torques at the guess may be anything:
-    /// out of the pit this takes a third of the iterations that all at once take, and converges where that does not
-    /// (docs/results.md).
+    /// Where legs are described, the first stage finds a feasible point without their joints, whose speeds and torques are
+    /// arbitrary at the guess. Out of the pit this takes a third of the iterations of solving everything at once, and converges
+    /// where that does not (docs/results.md).
     fn plain(&mut self, budget: usize) -> Result<StageEnd> {
         let model = self.task.model()?;
         let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
@@ -178,7 +172,7 @@ impl<'a> Solve<'a> {
         self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
     }
 
-    /// The terrain at 1/n, 2/n, … of its height, each solved to a feasible point from the last, the whole one with the costs.
+    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the costs.
     fn continuation(&mut self, steps: u32, failed: StageEnd) -> Result<StageEnd> {
         let scenario = self.task.scenario;
         let mut last = failed;
@@ -217,14 +211,15 @@ impl<'a> Solve<'a> {
         }
         let Task { scenario, robot, gait, ground, .. } = *self.task;
         let ground = Arc::new(scaled(ground, stage.height_fraction())?);
-        let space = match scenario.formulation {
-            Formulation::Direct => Space::Direct,
-            Formulation::Warped => match self.host.build_map(&ground)? {
-                Some(map) => Space::Warped(Box::new(map)),
+        let map = match scenario.formulation {
+            Formulation::Direct => None,
+            Formulation::Warped | Formulation::Hybrid => match self.host.build_map(&ground)? {
+                Some(map) => Some(Arc::new(map)),
                 None => return Ok(None),
             },
         };
-        Model::new(scenario, robot, gait, ground, space).map(Some)
+        let spaces = Spaces::of(scenario.formulation, map)?;
+        Ok(Some(Model::new(scenario, robot, gait, ground, spaces)))
     }
 
     /// Solves from x with at most `budget` iterations.
@@ -257,7 +252,7 @@ impl<'a> Solve<'a> {
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
         let solution = ipopt::solve(&mut problem, &options, None, &mut |record, x| {
             let iteration = record.iteration + before;
-            // A later stage starts at the point where the one before it ended, which has its row.
+            // A later stage starts at the point where the one before it ended, which already has its row.
             if record.iteration > 0 || history.is_empty() {
                 let seconds = record.seconds + seconds_before;
                 history.push(IterationRecord { iteration, seconds, ..record.clone() });

@@ -1,4 +1,4 @@
-//! How the robot stands at a place.
+//! Standing poses.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// Fixed-point rounds in which feet and pose are matched; the feet move with the pose.
 const ROUNDS: usize = 3;
 
-/// A standing pose on the ground: position of the centre of mass and orientation, ambient.
+/// A standing pose on the ground: position of the center of mass and orientation, ambient.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     /// p, m.
@@ -86,7 +86,7 @@ pub fn ensure_reach(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
         }
         if nearest > 1e-3 {
             return Err(Error::input(format!(
-                "start.position = [{}, {}]: foot {} cannot reach the ground there, it is {:.0} mm outside its box; start on more even ground or change start.yaw",
+                "start.position = [{}, {}]: foot {} cannot reach the ground there, which is {:.0} mm outside its reach box; start on more even ground or change start.yaw",
                 xy[0],
                 xy[1],
                 model.foot_names[i],

@@ -28,7 +28,7 @@ impl StoppingRule {
         Self { effort, with_costs, tolerance, objectives: Vec::new(), best: None, satisfied: false }
     }
 
-    /// Takes note of an iterate and tells whether to go on.
+    /// Records an iterate and decides whether to continue.
     pub fn observe(&mut self, record: &IterationRecord, x: &[f64]) -> ControlFlow<()> {
         if record.violation > self.tolerance {
             return ControlFlow::Continue(());

@@ -37,7 +37,7 @@ pub fn table(problem: &mut GaitProblem, x: &[f64]) -> Vec<BlockViolation> {
     let mut table: Vec<BlockViolation> = problem
         .blocks()
         .map(|(block, first)| {
-            // A NaN counts as the worst.
+            // NaN counts as infinite.
             let size = |r: usize| {
                 let v = excess(g[first + r], lower[first + r], upper[first + r]);
                 if g[first + r].is_nan() { f64::INFINITY } else { v }

@@ -1,90 +1,130 @@
-//! From a file and the command line to a scenario that holds together.
+//! Loads a scenario: its file, the overrides from the command line, and its robot, checked together.
 
 use std::path::{Path, PathBuf};
 
-use super::document::Document;
-use super::{Scenario, validate};
+use super::consistency;
+use super::format::Scenario;
+use crate::digest::sha256_hex;
+use crate::input::{self, Document};
+use crate::robot::Robot;
 use crate::{Error, Result};
 
-/// A scenario with where it came from.
+/// A scenario and its robot, with where they came from.
 #[derive(Clone, Debug)]
 pub struct LoadedScenario {
-    /// What is asked for.
+    /// What the user specified, overrides included.
     pub scenario: Scenario,
-    /// The file as text; with values set from the command line, the whole again as TOML with these in it.
-    pub text: String,
-    /// Relative paths in the scenario are relative to this folder.
+    /// The robot that it names.
+    pub robot: Robot,
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, all values with these applied.
+    pub effective_text: String,
+    /// The user's own text, exactly as it was read.
+    pub source_text: String,
+    /// Values set from the command line, `key=value` each.
+    pub overrides: Vec<String>,
+    /// Relative paths in the scenario start at this folder.
     pub base_dir: PathBuf,
-    /// The file, if it came from one.
-    pub path: Option<PathBuf>,
+    /// Name and SHA-256 (hexadecimal) of each file read so far: the scenario's and the robot's, where these are files.
+    pub inputs: Vec<(String, String)>,
     document: Document,
 }
 
 impl LoadedScenario {
-    /// An input error at a key of the scenario, with its file and line.
+    /// An input error at a key of the scenario, with file and line.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         self.document.error(key, what)
     }
 
-    /// Refuses a start or goal outside the ground.
+    /// Adds file and line to an error that names a key of the scenario; other errors stay as they are.
+    pub fn locate(&self, error: Error) -> Error {
+        located(&self.document, error)
+    }
+
+    /// Refuses a start or goal outside the ground. For terrain files, whose extent is known only once they are read.
     pub fn ensure_inside(&self, extent: [f64; 4]) -> Result<()> {
-        validate::inside(&self.document, &self.scenario, extent)
+        consistency::inside(&self.document, &self.scenario, extent)
     }
 }
 
-/// Reads a scenario file and sets the `overrides`, each `key=value` with a dotted key and a value in TOML (a bare
-/// word is a string). Refuses, with file, line, key, what was given and what is allowed: malformed TOML, unknown keys,
-/// wrong types, values out of range, NaN and infinity, another schema, and values that do not go together.
+/// Reads a scenario file, applies the `overrides` (each `key=value`, with a dotted key and a TOML value or a bare word as a
+/// string), and loads the robot.
+///
+/// # Errors
+/// For files that cannot be read, malformed TOML, unknown keys, wrong types, values out of range, NaN and infinity, another
+/// schema, and values that do not fit together. Messages have file, line, key, what was given and what is allowed.
 pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScenario> {
     let (document, text) = Document::read(path)?;
     let base_dir = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
         _ => PathBuf::from("."),
     };
-    let name = path.display().to_string();
-    Ok(LoadedScenario {
-        path: Some(path.to_path_buf()),
-        ..assemble(document, &name, text, base_dir, overrides)?
-    })
+    let name = path.file_name().map(|name| (name.to_string_lossy().into_owned(), sha256_hex(&text)));
+    let mut loaded = assemble(document, text, base_dir, overrides)?;
+    loaded.inputs.extend(name);
+    Ok(loaded)
 }
 
-/// As [`load`], for a scenario that is in memory; its relative paths are relative to `base_dir`, `name` is for messages.
+/// As [`load`], for a scenario in memory. Its relative paths start at `base_dir`; `name` is its name in messages.
+///
+/// # Errors
+/// Those of [`load`].
 pub fn load_text(name: &str, text: &str, base_dir: &Path, overrides: &[String]) -> Result<LoadedScenario> {
-    assemble(Document::parse(name, text)?, name, text.to_owned(), base_dir.to_path_buf(), overrides)
+    assemble(Document::parse(name, text)?, text.to_owned(), base_dir.to_path_buf(), overrides)
+}
+
+/// Parses the effective text of a scenario, as a plan carries it; `file` is its name in messages. Neither the robot nor any
+/// other file is read.
+///
+/// # Errors
+/// Those of [`load`] that need no other file.
+pub fn parse(file: &str, text: &str) -> Result<Scenario> {
+    let document = Document::parse(file, text)?;
+    let scenario = read(&document)?;
+    consistency::check(&document, &scenario, None)?;
+    Ok(scenario)
 }
 
 fn assemble(
     mut document: Document,
-    name: &str,
-    mut text: String,
+    source_text: String,
     base_dir: PathBuf,
     overrides: &[String],
 ) -> Result<LoadedScenario> {
     for assignment in overrides {
         document.set(assignment)?;
     }
-    let scenario = checked(&document)?;
-    if !overrides.is_empty() {
-        let body =
-            toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?;
-        text = format!("# {name} with --set {}\n{body}", overrides.join(" --set "));
+    let scenario = read(&document)?;
+    let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
+    consistency::check(&document, &scenario, Some(&robot))?;
+    let effective_text = match overrides {
+        [] => source_text.clone(),
+        _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
+    };
+    Ok(LoadedScenario {
+        inputs: robot.input.iter().cloned().collect(),
+        scenario,
+        robot,
+        effective_text,
+        source_text,
+        overrides: overrides.to_vec(),
+        base_dir,
+        document,
+    })
+}
+
+fn located(document: &Document, error: Error) -> Error {
+    match error {
+        Error::Key { key, what } => document.error(&key, what),
+        other => other,
     }
-    Ok(LoadedScenario { scenario, text, base_dir, path: None, document })
 }
 
-/// Parses the text of a scenario, as a plan carries it; `file` is the name for messages.
-pub fn parse(file: &str, text: &str) -> Result<Scenario> {
-    checked(&Document::parse(file, text)?)
-}
-
-fn checked(document: &Document) -> Result<Scenario> {
+fn read(document: &Document) -> Result<Scenario> {
     if let Some(schema) = document.table().get("schema").and_then(toml::Value::as_integer)
         && schema > 1
     {
         let what = format!("given {schema}, allowed: 1; this file is for a newer warpgait");
         return Err(document.error("schema", what));
     }
-    let scenario = document.typed::<Scenario>()?;
-    validate::together(document, &scenario)?;
-    Ok(scenario)
+    input::read_as(document)
 }

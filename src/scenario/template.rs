@@ -1,6 +1,6 @@
 //! The commented scenario that `warpgait init` writes.
 
-/// A scenario with every key at its default, explained. Its name goes into the first line.
+/// A scenario with every key at its default, with comments. Its name is in the first line.
 pub fn template(name: &str) -> String {
     // A line break in a name would end the comment.
     let name: String = name.chars().filter(|c| !c.is_control()).collect();

@@ -42,7 +42,7 @@ fn every_shipped_scenario_loads() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
             let loaded = load(&path, &[]).unwrap();
-            crate::robot::Robot::load(&loaded.scenario.robot, &loaded.base_dir).unwrap();
+            assert_eq!(loaded.effective_text, loaded.source_text);
             count += 1;
         }
     }
@@ -68,6 +68,80 @@ fn the_template_is_a_scenario_of_defaults() {
     assert_eq!(scenario.gait, GaitSpec::default());
     assert_eq!(scenario.map, MapSpec::default());
     assert_eq!(scenario.contact, ContactSpec::default());
+}
+
+/// The `oneOf` of `[terrain]` in the schema.
+fn terrain_schemas() -> Vec<serde_json::Value> {
+    json_schema()["$defs"]["TerrainSpec"]["oneOf"].as_array().unwrap().clone()
+}
+
+#[test]
+fn every_kind_of_terrain_is_closed_and_knows_its_name() {
+    let kinds: Vec<String> = terrain_schemas()
+        .iter()
+        .map(|schema| {
+            assert_eq!(schema["additionalProperties"], false, "{schema}");
+            let kind = schema["properties"]["kind"]["const"].as_str().unwrap();
+            let mut text = format!("kind = \"{kind}\"\n");
+            for key in schema["required"].as_array().unwrap().iter().filter(|key| *key != "kind") {
+                let property = &schema["properties"][key.as_str().unwrap()];
+                text += &format!("{key} = {}\n", if property["type"] == "string" { "\"x\"" } else { "0.5" });
+            }
+            let spec: TerrainSpec = toml::from_str(&text).unwrap();
+            assert_eq!(spec.kind(), kind);
+            assert!(toml::from_str::<TerrainSpec>(&format!("{text}no_such_key = 1")).is_err(), "{text}");
+            kind.to_owned()
+        })
+        .collect();
+    let (_, _, comment) = terrain_lines().swap_remove(0);
+    assert_eq!(comment, kinds.join(" | "));
+}
+
+/// The lines of the template's `[terrain]`: key, value, comment; those that are commented out, too.
+fn terrain_lines() -> Vec<(String, toml::Value, String)> {
+    let text = template("t");
+    let section = text.split("[terrain]\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let parse = |line: &str| {
+        let (assignment, comment) = line.trim_start_matches("# ").split_once('#').unwrap();
+        let (key, value) = toml::from_str::<toml::Table>(assignment).unwrap().into_iter().next().unwrap();
+        (key, value, comment.trim().to_owned())
+    };
+    section.lines().map(parse).collect()
+}
+
+#[test]
+fn the_template_shows_every_terrain_key_with_its_default() {
+    let lines = terrain_lines();
+    for schema in terrain_schemas() {
+        let kind = schema["properties"]["kind"]["const"].as_str().unwrap();
+        for key in schema["properties"].as_object().unwrap().keys() {
+            assert!(lines.iter().any(|(k, ..)| k == key), "{key} is not in the template");
+        }
+        // Parameters of the paper's terrains: as shown, they are those of the medium level.
+        let shown = |key: &str| {
+            let (_, value, comment) = lines.iter().find(|(k, ..)| k == key).unwrap();
+            let other = comment.split("; ").find_map(|part| part.strip_prefix(&format!("{kind}: ")));
+            other.map_or(value.as_float().unwrap(), |text| text.parse().unwrap())
+        };
+        match toml::from_str(&format!("kind = \"{kind}\"")) {
+            Ok(TerrainSpec::Rippled(s)) => {
+                assert_eq!([s.amplitude(), s.wavelength()], ["amplitude", "wavelength"].map(shown));
+                let (domain, extent) = (s.domain, lines.last().unwrap().1.clone().try_into());
+                assert_eq!((domain.spacing, Ok(domain.extent)), (shown("spacing"), extent));
+            }
+            Ok(TerrainSpec::Conic(s)) => {
+                let names = ["slope", "radius", "tip", "foot"];
+                assert_eq!([s.slope(), s.radius(), s.tip(), s.foot()], names.map(shown));
+            }
+            Ok(TerrainSpec::Hilly(s)) => {
+                assert_eq!([s.height(), s.width()], ["height", "width"].map(shown));
+            }
+            Ok(TerrainSpec::Pit(s)) => {
+                assert_eq!([s.depth(), s.radius(), s.edge()], ["depth", "radius", "edge"].map(shown));
+            }
+            _ => (),
+        }
+    }
 }
 
 #[test]
@@ -114,7 +188,51 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             with("kind = \"rippled\"", "kind = \"rippled\"\ndepth = 1.0"),
             vec!["s.toml:5: terrain.depth: not a key of kind = \"rippled\"", "wavelength"],
         ),
-        (with("kind = \"rippled\"", "kind = \"formula\""), vec!["s.toml:3: terrain.expression: missing"]),
+        (
+            with("kind = \"rippled\"", "kind = \"mesh\""),
+            vec!["s.toml:4: terrain.kind: given \"mesh\" (a string), allowed: \"flat\", \"rippled\""],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"rippled\"\namplitud = 1.0"),
+            vec![
+                "s.toml:5: terrain.amplitud: unknown key; did you mean `amplitude`?",
+                "allowed with kind = \"rippled\": level, amplitude, wavelength, extent, spacing",
+            ],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"hilly\"\nheight = 21"),
+            vec!["s.toml:5: terrain.height: given 21, allowed: a finite number from -20 to 20"],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"formula\""),
+            vec!["s.toml:3: terrain.expression: missing; kind = \"formula\" needs it: a string"],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"heightmap\"\nfile = \"h.png\""),
+            vec!["s.toml:3: terrain.spacing: missing; kind = \"heightmap\" needs it: a finite number"],
+        ),
+        (
+            with(
+                "kind = \"rippled\"",
+                "kind = \"heightmap\"\nfile = \"h.png\"\nspacing = 0.01\nsmoothing = 1",
+            ),
+            vec!["s.toml:7: terrain.smoothing: given 1, allowed: at most 0.5 m, 50 times terrain.spacing"],
+        ),
+        (
+            with(
+                "kind = \"rippled\"",
+                "kind = \"heightmap\"\nfile = \"h.png\"\nspacing = 0.1\nextent = [0, 1, 0, 0.1]",
+            ),
+            vec!["s.toml:7: terrain.extent: given [0, 1, 0, 0.1], allowed"],
+        ),
+        (
+            with("horizon = 10", "horizon = 10\nphysics.law = \"newton-euler\""),
+            vec![
+                "s.toml:3: physics.law: given \"newton-euler\"",
+                "law = \"pcdm\"",
+                "formulation = \"direct\"",
+            ],
+        ),
         (
             with("kind = \"rippled\"", "kind = \"flat\"\nextent = [3.0, -3.0, 0.0, 1.0]"),
             vec!["s.toml:5: terrain.extent: given [3, -3"],
@@ -141,7 +259,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             with("horizon = 10", "horizon = 10\n[solver]\nthreads = 3"),
             vec!["s.toml:4: solver.threads: given 3, allowed: an integer from 1 to 2"],
         ),
-        (with("horizon = 10", "horizon = 0.1"), vec!["time_step: given 0.05, which makes 2.0 steps"]),
+        (
+            with("horizon = 10", "horizon = 0.1"),
+            vec!["time_step: given 0.05, which divides the horizon of 0.1 s into 2.0 steps"],
+        ),
         (with("horizon = 10", "horizon = = 10"), vec!["s.toml:2: not TOML", "horizon = = 10"]),
         (with("horizon = 10", "horizon = 10\nhorizon = 11"), vec!["s.toml:3: not TOML", "duplicate"]),
         (
@@ -172,8 +293,10 @@ fn values_can_be_set_from_the_command_line() {
     assert_eq!(loaded.scenario.map.cells, Some([8, 9, 10]));
     assert_eq!(loaded.scenario.solver.continuation, Continuation::Steps(3));
     assert_eq!(loaded.scenario.goal.yaw, Some(0.1));
-    // What a plan carries says the same again.
-    assert_eq!(parse("plan", &loaded.text).unwrap(), loaded.scenario);
+    // A plan carries both: what was in effect, and the user's own text.
+    assert_eq!(parse("plan", &loaded.effective_text).unwrap(), loaded.scenario);
+    assert_eq!(loaded.source_text, GOOD);
+    assert_eq!(loaded.overrides[0], "gait.kind=pace");
 
     for (values, expected) in [
         (&["gait.knd=pace"][..], "--set gait.knd=pace: gait.knd: unknown key; did you mean `kind`?"),
@@ -188,6 +311,59 @@ fn values_can_be_set_from_the_command_line() {
         let message = set(values).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     }
+}
+
+#[test]
+fn what_the_robot_does_not_allow_is_refused_with_its_line() {
+    let robot = |line: &str| with("[terrain]", &format!("[robot]\n{line}\n[terrain]"));
+    let phases = with("kind = \"trot\"", "kind = \"custom\"\nphases = [[10.0], [10.0]]");
+    for (text, expected) in [
+        (
+            robot("adhesive_feet = [\"LF\", \"RFF\"]"),
+            vec![
+                "s.toml:4: robot.adhesive_feet[1]: \"RFF\" is not a foot of anymal_b; its feet: LF, RF, LH, RH",
+                "did you mean \"RF\"?",
+            ],
+        ),
+        (
+            robot("adhesive_feet = [\"LF\", \"LF\"]"),
+            vec!["s.toml:4: robot.adhesive_feet[1]: \"LF\" is given twice"],
+        ),
+        (
+            robot("name = \"anymal_d\""),
+            vec!["s.toml:4: robot.name: given \"anymal_d\"", "did you mean \"anymal_b\"?"],
+        ),
+        (robot("file = \"none.toml\""), vec!["s.toml:4: robot.file: ", "none.toml"]),
+        (
+            robot("name = \"anymal_b\"\nfile = \"r.toml\""),
+            vec!["s.toml:5: robot.file: given together with robot.name"],
+        ),
+        (phases, vec!["s.toml:11: gait.phases: given 2 rows, allowed: one for each foot: LF, RF, LH, RH"]),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("r.toml"), include_str!("../../robots/anymal_b.toml")).unwrap();
+        let message = load_text("s.toml", &text, folder.path(), &[]).expect_err(&text).to_string();
+        for part in expected {
+            assert!(message.contains(part), "`{part}` is not in: {message}");
+        }
+    }
+    let key = crate::Error::key("gait.kind", "not for this robot");
+    let message = load_text("s.toml", GOOD, Path::new("."), &[]).unwrap().locate(key).to_string();
+    assert_eq!(message, "s.toml:10: gait.kind: not for this robot");
+}
+
+#[test]
+fn digests_are_those_of_what_was_read() {
+    let robot = include_str!("../../robots/anymal_b.toml");
+    let text = format!("{GOOD}[robot]\nfile = \"r.toml\" # mine\n");
+    let (folder, path) = in_folder(&text);
+    std::fs::write(folder.path().join("r.toml"), robot).unwrap();
+    let loaded = load(&path, &["horizon=9".into()]).unwrap();
+    let expected = [("r.toml", robot), ("s.toml", &text)];
+    let expected = expected.map(|(name, text)| (name.to_owned(), crate::digest::sha256_hex(text)));
+    assert_eq!(loaded.inputs, expected);
+    assert_eq!(loaded.source_text, text);
+    assert_eq!(parse("plan", &loaded.effective_text).unwrap().horizon, 9.0);
 }
 
 #[test]

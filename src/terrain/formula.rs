@@ -1,12 +1,15 @@
 //! h(x, y) as an expression in a scenario: `0.3*exp(-x^2) + max(0, 0.1*sin(2*y))`.
 //!
-//! The usual rules: `^` binds tightest and from the right, then signs, then `* /`, then `+ -`; so −x^2 = −(x²), as in
-//! Python. (A parser with signs binding tighter than powers turns exp(−x^2) into a cliff without a word.)
+//! The usual precedence: `^` binds tightest and from the right, then signs, then `* /`, then `+ -`. So −x^2 = −(x²), as in
+//! Python. (A parser in which signs bind tighter than powers would silently turn exp(−x^2) into a cliff.)
 
 use crate::error::{Error, Result};
 
 /// Longer expressions are refused; this also bounds the depth of the tree.
 const MAX_LENGTH: usize = 2000;
+
+/// The key that messages name.
+const KEY: &str = "terrain.expression";
 
 type Unary = fn(f64) -> f64;
 type Binary = fn(f64, f64) -> f64;
@@ -64,37 +67,38 @@ impl Formula {
     /// Parses an expression.
     ///
     /// # Errors
-    /// Says at which character the expression stops making sense, and what would be allowed there.
+    /// [`Error::Key`] with the character at which the expression is wrong, and what is allowed there.
     pub fn parse(text: &str) -> Result<Self> {
         if text.len() > MAX_LENGTH {
-            return Err(Error::input(format!(
-                "terrain.expression has {} characters; at most {MAX_LENGTH} are allowed (a heightmap holds more)",
+            let what = format!(
+                "given {} characters, allowed: at most {MAX_LENGTH} (a heightmap can hold more detail)",
                 text.len()
-            )));
+            );
+            return Err(Error::key(KEY, what));
         }
         let mut parser = Parser { text, position: 0, depth: 0 };
         let root = parser.sum()?;
         match parser.peek() {
             None => Ok(Self { text: text.into(), root }),
-            Some(')') => Err(parser.error("this ')' closes nothing")),
-            Some(_) => Err(parser.error("an operator is missing here (multiplication is written *)")),
+            Some(')') => Err(parser.error("unmatched ')'")),
+            Some(_) => Err(parser.error("expected an operator (multiplication is written *)")),
         }
     }
 
     /// h(x, y).
     ///
     /// # Errors
-    /// Where the value is not a finite number: says at which x, y.
+    /// [`Error::Key`] with x and y, where the value is not a finite number.
     pub fn height(&self, x: f64, y: f64) -> Result<f64> {
         let h = self.root.value(x, y);
         if h.is_finite() {
             return Ok(h);
         }
-        Err(Error::input(format!(
-            "terrain.expression {:?} is {h} at x = {x:.4}, y = {y:.4}: it must be a finite height everywhere in \
-             terrain.extent",
+        let what = format!(
+            "{:?} is {h} at x = {x:.4}, y = {y:.4}; it must be a finite height everywhere in terrain.extent",
             self.text
-        )))
+        );
+        Err(Error::key(KEY, what))
     }
 }
 
@@ -110,10 +114,10 @@ impl Node {
     }
 }
 
-/// Recursive descent; one method per level of binding.
+/// Recursive descent; one method per level of precedence.
 struct Parser<'a> {
     text: &'a str,
-    /// In bytes, always at a character's start.
+    /// In bytes, always at the start of a character.
     position: usize,
     depth: usize,
 }
@@ -178,7 +182,7 @@ impl Parser<'_> {
         };
         self.position += operator;
         let exponent = self.signed()?;
-        // Whole powers by multiplication: exact for squares, and fast.
+        // Squares by multiplication: exact, and fast.
         if let Node::Number(n) = exponent
             && n == 2.0
         {
@@ -198,8 +202,8 @@ impl Parser<'_> {
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_alphabetic() || c == '_' => self.name(),
-            Some(_) => Err(self.error("a number, x, y, a function or a parenthesis should stand here")),
-            None => Err(self.error("something is missing at the end")),
+            Some(_) => Err(self.error("expected a number, x, y, a function or a parenthesis")),
+            None => Err(self.error("the expression ends too early")),
         }
     }
 
@@ -252,7 +256,7 @@ impl Parser<'_> {
         }
         self.position = start;
         Err(self.error(&format!(
-            "{name:?} is unknown; there are the variables x and y, the constants {}, and the functions {} {}",
+            "{name:?} is unknown; allowed: the variables x and y, the constants {}, and the functions {} {}",
             names(&CONSTANTS),
             names(&FUNCTIONS),
             names(&FUNCTIONS_OF_TWO)
@@ -264,10 +268,10 @@ impl Parser<'_> {
             self.position += wanted.len_utf8();
             return Ok(());
         }
-        Err(self.error(&format!("a {wanted:?} should stand here")))
+        Err(self.error(&format!("expected {wanted:?}")))
     }
 
-    /// The next character that is not a space, without taking it.
+    /// The next character that is not a space, without consuming it.
     fn peek(&mut self) -> Option<char> {
         let rest = &self.text[self.position..];
         self.position += rest.len() - rest.trim_start().len();
@@ -276,7 +280,7 @@ impl Parser<'_> {
 
     fn error(&self, what: &str) -> Error {
         let column = self.text[..self.position].chars().count() + 1;
-        Error::input(format!("terrain.expression {:?}, character {column}: {what}", self.text))
+        Error::key(KEY, format!("{:?}, character {column}: {what}", self.text))
     }
 }
 
@@ -326,20 +330,20 @@ mod tests {
         let signs = "-".repeat(1500) + "x";
         let long = "x+".repeat(1500) + "x";
         let cases = [
-            ("", "character 1: something is missing"),
-            ("   ", "missing at the end"),
-            ("x +", "missing at the end"),
-            ("2x", "character 2: an operator is missing"),
-            ("x y", "character 3: an operator"),
-            ("(x", "a ')' should"),
-            ("x)", "closes nothing"),
-            ("sin x", "a '(' should"),
-            ("max(x)", "a ',' should"),
+            ("", "character 1: the expression ends too early"),
+            ("   ", "ends too early"),
+            ("x +", "ends too early"),
+            ("2x", "character 2: expected an operator"),
+            ("x y", "character 3: expected an operator"),
+            ("(x", "expected ')'"),
+            ("x)", "unmatched"),
+            ("sin x", "expected '('"),
+            ("max(x)", "expected ','"),
             ("z + x", "\"z\" is unknown"),
             ("x * foo(y)", "character 5: \"foo\" is unknown"),
-            ("x > 0", "an operator is missing"),
-            ("*x", "a number, x, y"),
-            ("1.2.3", "an operator is missing"),
+            ("x > 0", "expected an operator"),
+            ("*x", "expected a number, x, y"),
+            ("1.2.3", "expected an operator"),
             (".", "not a number"),
             ("x²", "\"x²\" is unknown"),
             ("é", "\"é\" is unknown"),
@@ -354,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_no_heights_are_refused_with_their_place() {
+    fn values_that_are_not_heights_are_refused_with_their_position() {
         for text in ["1/x", "ln(x)", "sqrt(x-1)", "0/x", "exp(1000 + x)"] {
             let message = Formula::parse(text).unwrap().height(0.0, 0.25).unwrap_err().to_string();
             assert!(message.contains("at x = 0.0000, y = 0.2500"), "{message}");

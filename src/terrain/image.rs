@@ -1,27 +1,30 @@
-//! Grey levels of a PNG image, 0 (black) to 1 (white).
+//! Gray levels of a PNG image, 0 (black) to 1 (white).
 
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
-use super::heightmap::{Raster, check_size};
+use super::raster::{Raster, check_size};
 use crate::error::{Error, Result};
 
-/// How every PNG file begins.
+/// The first bytes of every PNG file.
 pub const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Luma of red, green and blue (ITU-R BT.601).
 const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
-/// Decodes any PNG: 1 to 16 bit, grey, colour (by luma) or palette; what is fully transparent has no data.
+/// Decodes any PNG: 1 to 16 bits, gray, color (by luma) or palette; fully transparent pixels have no data.
+///
+/// # Errors
+/// If the bytes are not a valid PNG, or the image is too small or too large.
 pub fn decode(bytes: &[u8]) -> Result<Raster> {
-    // Enough for the largest image allowed, at 8 bytes a pixel.
+    // Twice what the largest image allowed takes at 8 bytes per pixel.
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: 256 << 20 });
-    let complain = |e: png::DecodingError| Error::input(format!("not a sound PNG image: {e}"));
+    let complain = |e: png::DecodingError| Error::input(format!("not a valid PNG image: {e}"));
     let header = decoder.read_header_info().map_err(complain)?;
     let (columns, rows) = (header.width as usize, header.height as usize);
     check_size(columns as u64, rows as u64)?;
-    // Palettes to colours, few bits to eight, a transparent colour to an alpha channel.
+    // Palettes become colors, few bits eight, a transparent color an alpha channel.
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(complain)?;
     let size = reader.output_buffer_size().ok_or_else(|| Error::input("the image is too large"))?;

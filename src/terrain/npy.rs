@@ -2,15 +2,18 @@
 
 use npyz::{DType, NpyFile, NpyHeader, Order, TypeChar};
 
-use super::heightmap::{Raster, check_size};
+use super::raster::{Raster, check_size};
 use crate::error::{Error, Result};
 
-/// How every `.npy` file begins.
+/// The first bytes of every `.npy` file.
 pub const SIGNATURE: &[u8] = b"\x93NUMPY";
 
 /// Decodes a two-dimensional array of floats or integers; NaN = no data.
+///
+/// # Errors
+/// If the bytes are not a valid array of this kind, it is too small or too large, or an element is infinite.
 pub fn decode(bytes: &[u8]) -> Result<Raster> {
-    let complain = |e: std::io::Error| Error::input(format!("not a sound .npy array: {e}"));
+    let complain = |e: std::io::Error| Error::input(format!("not a valid .npy array: {e}"));
     let mut data = bytes;
     let header = NpyHeader::from_reader(&mut data).map_err(complain)?;
     let &[rows, columns] = header.shape() else {

@@ -1,23 +1,21 @@
-//! Measured ground: a raster of heights with holes and noise becomes a smooth heightfield.
+//! Ground from a scan: a raster of heights with holes and noise becomes a smooth heightfield.
 
-use super::{FitError, Ground, GroundReport};
+use super::fill::fill_holes;
+use super::ground::{FitError, Ground, GroundReport};
+use super::raster::{bilinear, range};
+use super::smooth::smooth;
 use crate::error::{Error, Result};
-use crate::heightfield::raster::{bilinear, fill_holes, range, smooth};
 use crate::heightfield::{Grid, Heightfield, MAX_SAMPLES};
-use crate::scenario::TerrainSpec;
+use crate::scenario::terrain::HeightmapSpec;
 
-/// Default smoothing: this many cells, because a scan's finest detail is noise …
-const SMOOTHING_CELLS: f64 = 1.5;
-/// … and at least this length, m: a foot does not feel less.
-const SMOOTHING_LENGTH: f64 = 0.03;
-/// Smoothing over more cells than this is refused (it would also take minutes).
-const SMOOTHING_LIMIT: f64 = 50.0;
-/// Coarser scans are refined to about this spacing, m, so that those who want a raster get a fine one.
+/// Coarser scans are refined to about this spacing, m, so that users of the raster get a fine one.
 const FINE_SPACING: f64 = 0.02;
-/// Heights further apart than this are taken for a wrong `height_scale`, m.
+/// Larger differences of height are taken for a wrong `height_scale`, m.
 const LARGEST_RELIEF: f64 = 1000.0;
+/// `terrain.extent` may exceed the file by this, m, because users round.
+const EXTENT_SLACK: f64 = 1e-4;
 
-/// Heights at the nodes of a grid, row 0 at the least y; NaN where there is no data.
+/// Heights at the nodes of a grid, row 0 at the least y; NaN for no data.
 pub struct Scan {
     /// Where the nodes are; the same spacing along x and y.
     pub grid: Grid,
@@ -25,32 +23,38 @@ pub struct Scan {
     pub heights: Vec<f64>,
 }
 
-/// Fills, smooths, interpolates, crops and refines, and reports what it did. `name` is the file, for messages.
-pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
+/// Fills, smooths, interpolates, crops and refines, and reports what it did.
+///
+/// # Errors
+/// [`Error::Key`] if nothing was measured, the heights differ too much or are too large, or the extent exceeds the scan.
+pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Ground> {
+    let refuse =
+        |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{:?}: {what}", spec.file));
     let Scan { grid, heights: measured } = scan;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
-    let smoothing = smoothing_length(spec, &grid)?;
+    let smoothing = spec.smoothing();
 
     let mut filled = measured.clone();
-    let holes_filled =
-        fill_holes(grid.columns, &mut filled).map_err(|e| Error::input(format!("{name}: {e}")))?;
+    fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;
     let (low, high) = range(&filled);
     if high - low > LARGEST_RELIEF {
-        return Err(Error::input(format!(
-            "{name}: heights from {low:.3e} to {high:.3e} m; more than {LARGEST_RELIEF} m apart must be a mistake: \
+        return Err(refuse(&format!(
+            "heights from {low:.3e} to {high:.3e} m; more than {LARGEST_RELIEF} m apart must be a mistake: \
              see terrain.height_scale"
         )));
     }
     let holes: Vec<bool> = measured.iter().map(|h| h.is_nan()).collect();
     let smoothed = smooth(grid.columns, &filled, &holes, smoothing / spacing);
-    let whole = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &smoothed)?;
+    let whole = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &smoothed)
+        .map_err(|e| refuse(&e))?;
 
     let fine = refined_spacing(extent, spacing);
     let field = if extent == grid.extent() && fine == spacing {
         whole
     } else {
-        Heightfield::from_function(extent, fine, |x, y| Ok(whole.height(x, y)))?
+        Heightfield::from_function(extent, fine, |x, y| Ok(whole.height(x, y)))
+            .map_err(|e| Error::key("terrain.extent", e))?
     };
     let place = |x: f64, y: f64| ((x - grid.origin[0]) / spacing, (y - grid.origin[1]) / spacing);
     let raw = field.grid().sample(|x, y| {
@@ -59,81 +63,76 @@ pub fn ground(spec: &TerrainSpec, name: &str, scan: Scan) -> Result<Ground> {
     })?;
 
     let mut error = FitError::default();
-    for (i, h) in measured.iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+    let (mut cells, mut holes_filled) = (0, 0);
+    for (i, h) in measured.iter().enumerate() {
         let (x, y) = (grid.x(i % grid.columns), grid.y(i / grid.columns));
         if (extent[0]..=extent[1]).contains(&x) && (extent[2]..=extent[3]).contains(&y) {
-            error.add(x, y, field.height(x, y) - h);
+            cells += 1;
+            match h.is_nan() {
+                true => holes_filled += 1,
+                false => error.add(x, y, field.height(x, y) - h),
+            }
         }
     }
-    let mut report = GroundReport::of(spec.kind, &field, &error);
+    let mut report = GroundReport::of(kind, &field, &error);
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
-    report.notes = notes(spec, &grid, holes_filled, smoothing, &report);
+    report.notes = notes(spec, &grid, cells, &report);
     Ok(Ground { field, raw: Some(raw), report, inputs: Vec::new() })
 }
 
-fn notes(
-    spec: &TerrainSpec,
-    grid: &Grid,
-    holes: usize,
-    smoothing: f64,
-    report: &GroundReport,
-) -> Vec<String> {
+/// What a user should know about a scan, of whose grid `cells` lie within the extent.
+fn notes(spec: &HeightmapSpec, grid: &Grid, cells: usize, report: &GroundReport) -> Vec<String> {
     let mut notes = Vec::new();
     if spec.smoothing.is_none() {
         notes.push(format!(
-            "smoothed over {smoothing:.3} m by default (the larger of {SMOOTHING_CELLS} cells and {SMOOTHING_LENGTH} m; \
-             terrain.smoothing sets it); heights moved by {:.4} m rms, {:.4} m at most",
-            report.fit_error_rms, report.fit_error_max
+            "smoothed over {:.3} m by default (the larger of {} cells and {} m; terrain.smoothing sets it); \
+             heights moved by {:.4} m rms, {:.4} m at most",
+            report.smoothing,
+            HeightmapSpec::SMOOTHING_CELLS,
+            HeightmapSpec::SMOOTHING_LENGTH,
+            report.fit_error_rms,
+            report.fit_error_max
         ));
     }
+    let holes = report.holes_filled;
     if holes > 0 {
         notes.push(format!(
-            "{holes} of {} cells have no data and were filled from their surroundings ({:.1} %)",
-            grid.len(),
-            100.0 * holes as f64 / grid.len() as f64
+            "{holes} of {cells} cells have no data and were filled from their surroundings ({:.1} %)",
+            100.0 * holes as f64 / cells as f64
         ));
     }
     if report.grid != [grid.columns, grid.rows] {
+        let cropped = if spec.extent.is_some() { "cropped and " } else { "" };
         notes.push(format!(
-            "{} x {} cells of {:.4} m became {} x {} of {:.4} m by the spline",
+            "{} x {} cells of {:.4} m were {cropped}interpolated to {} x {} of {:.4} m",
             grid.columns, grid.rows, grid.spacing[0], report.grid[0], report.grid[1], report.spacing[0]
         ));
     }
     notes
 }
 
-/// The rectangle asked for, which must lie within that of the scan.
+/// The rectangle to use, which must lie within that of the scan; by default it is the whole scan.
 fn cropped(wanted: Option<[f64; 4]>, whole: [f64; 4]) -> Result<[f64; 4]> {
     let Some(wanted) = wanted else {
         return Ok(whole);
     };
-    // A tenth of a millimetre is a rounding of the user's, not a wish.
-    let slack = 1e-4;
     let inside = (0..4).all(|k| {
         let outwards = if k % 2 == 0 { whole[k] - wanted[k] } else { wanted[k] - whole[k] };
-        outwards <= slack
+        outwards <= EXTENT_SLACK
     });
     if !inside {
-        return Err(Error::input(format!(
-            "terrain.extent {wanted:?} reaches beyond the file, which covers [{:.3}, {:.3}, {:.3}, {:.3}] (x_min, x_max, \
-             y_min, y_max in metres; see terrain.spacing and terrain.origin)",
-            whole[0], whole[1], whole[2], whole[3]
-        )));
+        let [x_min, x_max, y_min, y_max] = whole;
+        let what = format!(
+            "given {wanted:?}, which reaches beyond the file; allowed: within [{x_min:.3}, {x_max:.3}, {y_min:.3}, \
+             {y_max:.3}] (x_min, x_max, y_min, y_max in m; see terrain.spacing and terrain.origin)"
+        );
+        return Err(Error::key("terrain.extent", what));
     }
     Ok(std::array::from_fn(|k| if k % 2 == 0 { wanted[k].max(whole[k]) } else { wanted[k].min(whole[k]) }))
 }
 
-/// The standard deviation of the smoothing, m: as given, or by default.
-fn smoothing_length(spec: &TerrainSpec, grid: &Grid) -> Result<f64> {
-    let spacing = grid.spacing[0];
-    let Some(length) = spec.smoothing else {
-        return Ok((SMOOTHING_CELLS * spacing).max(SMOOTHING_LENGTH).min(SMOOTHING_LIMIT * spacing));
-    };
-    super::in_range("smoothing", length, [0.0, SMOOTHING_LIMIT * spacing])
-}
-
-/// The spacing itself when it is fine enough, else the one that divides it and is closest below [`FINE_SPACING`].
+/// The spacing itself if it is fine enough, otherwise the largest whole fraction of it up to [`FINE_SPACING`].
 fn refined_spacing([x_min, x_max, y_min, y_max]: [f64; 4], spacing: f64) -> f64 {
     if spacing <= 1.25 * FINE_SPACING {
         return spacing;

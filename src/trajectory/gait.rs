@@ -35,6 +35,9 @@ impl Gait {
 
     /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom); `cycle` is the
     /// length of a cycle, s, where the scenario names none.
+    ///
+    /// # Errors
+    /// [`Error::Key`] for a gait that the feet, the horizon or the time step do not allow.
     pub fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
         let step = scenario.time_step;
         let intervals = (scenario.horizon / step).round() as usize;
@@ -52,7 +55,7 @@ impl Gait {
         if gait.optimize_durations {
             for (swings, name) in swings.iter_mut().zip(foot_names) {
                 switches::make_room(swings, intervals, step, gait.duration_bounds)
-                    .map_err(|what| Error::input(format!("gait.optimize_durations: foot {name}: {what}")))?;
+                    .map_err(|what| Error::key("gait.optimize_durations", format!("foot {name}: {what}")))?;
             }
         }
         Ok(Self { intervals, swings })
@@ -90,9 +93,10 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
         .iter()
         .map(|name| {
             order.iter().position(|o| o == name).map(|i| table[i]).ok_or_else(|| {
-                Error::input(format!(
-                    "gait.kind: the shipped gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
-                ))
+                let what = format!(
+                    "the shipped gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
+                );
+                Error::key("gait.kind", what)
             })
         })
         .collect::<Result<_>>()?;
@@ -103,18 +107,20 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
 fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Result<Vec<Vec<Swing>>> {
     let swing = ((1.0 - duty) * cycle / step).round();
     if swing < 2.0 {
-        return Err(Error::input(format!(
-            "gait: a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, lower the duty or the time_step",
+        let what = format!(
+            "a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, or lower the duty or the time_step",
             (1.0 - duty) * cycle
-        )));
+        );
+        return Err(Error::key("gait.cycle", what));
     }
     let last = offsets.iter().fold(0.0, |a: f64, &b| a.max(b)) + (1.0 - duty);
     // n cycles take (n - 1 + last) cycle lengths.
     let cycles = ((horizon - 2.0 * STAND) / cycle - last + 1.0 + 1e-9).floor();
     if cycles < 1.0 {
-        return Err(Error::input(format!(
-            "gait: not one cycle of {cycle} s fits into the horizon of {horizon} s with {STAND} s of standing at both ends; lengthen the horizon or shorten gait.cycle"
-        )));
+        let what = format!(
+            "given {horizon} s, into which not one cycle of {cycle} s fits with {STAND} s of standing at both ends; lengthen it or shorten gait.cycle"
+        );
+        return Err(Error::key("horizon", what));
     }
     let begin = (horizon - (cycles - 1.0 + last) * cycle) / 2.0;
     Ok(offsets
@@ -130,50 +136,38 @@ fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Re
         .collect())
 }
 
-/// Phase tables: stance and swing durations in turn, stance first and last.
+/// Phase tables: alternating stance and swing durations per foot, stance first and last; they fill the horizon.
 fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize) -> Result<Vec<Vec<Swing>>> {
-    let phases = phases.ok_or_else(|| {
-        Error::input("gait.phases: kind = \"custom\" needs a table of phase durations for each foot, stance first, in s")
-    })?;
-    if phases.len() != feet {
-        return Err(Error::input(format!(
-            "gait.phases: {} tables given, but the robot has {feet} feet",
-            phases.len()
-        )));
-    }
-    phases
-        .iter()
-        .enumerate()
-        .map(|(foot, durations)| {
-            if durations.len() % 2 == 0 {
-                return Err(Error::input(format!(
-                    "gait.phases[{foot}]: {} durations; an odd number is needed, for a foot stands at the start and at the end",
-                    durations.len()
-                )));
+    let Some(phases) = phases.filter(|phases| phases.len() == feet) else {
+        // Loading a scenario refuses this with file and line.
+        return Err(Error::key("gait.phases", "kind = \"custom\" needs a row for each foot"));
+    };
+    let row = |(foot, durations): (usize, &Vec<f64>)| {
+        let key = format!("gait.phases[{foot}]");
+        if durations.len() % 2 == 0 {
+            let what = format!(
+                "given {} durations, allowed: an odd number, because a foot stands at the start and at the end",
+                durations.len()
+            );
+            return Err(Error::key(key, what));
+        }
+        let mut edges = vec![0.0];
+        let mut time = 0.0;
+        for d in durations {
+            time += d;
+            edges.push((time / step).round());
+        }
+        edges[durations.len()] = intervals as f64;
+        for (j, pair) in edges.windows(2).enumerate() {
+            if pair[1] < pair[0] + 2.0 {
+                let what =
+                    format!("given {} s, which is shorter than two time steps of {step} s", durations[j]);
+                return Err(Error::key(format!("{key}[{j}]"), what));
             }
-            let mut edges = vec![0.0];
-            let mut time = 0.0;
-            for d in durations {
-                time += d;
-                edges.push((time / step).round());
-            }
-            if edges[durations.len()] != intervals as f64 {
-                return Err(Error::input(format!(
-                    "gait.phases[{foot}]: the durations sum to {time} s, but the horizon is {} s",
-                    intervals as f64 * step
-                )));
-            }
-            for (j, pair) in edges.windows(2).enumerate() {
-                if pair[1] < pair[0] + 2.0 {
-                    return Err(Error::input(format!(
-                        "gait.phases[{foot}][{j}]: {} s is shorter than two time steps of {step} s",
-                        durations[j]
-                    )));
-                }
-            }
-            Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
-        })
-        .collect()
+        }
+        Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
+    };
+    phases.iter().enumerate().map(row).collect()
 }
 
 #[cfg(test)]
@@ -215,12 +209,18 @@ mod tests {
     }
 
     #[test]
-    fn a_custom_table_must_fill_the_horizon() {
+    fn a_custom_table_sets_the_switches() {
         let ok = "[gait]\nkind = \"custom\"\nphases = [[5.0, 0.5, 4.5], [10.0], [10.0], [10.0]]";
         let gait = Gait::new(&scenario(ok), &names(), 1.0).expect("a gait");
         assert_eq!(gait.swings[0], [Swing::given(100.0, 110.0)]);
         assert_eq!(gait.stances(0), [Stance { start: 0.0, end: 100.0 }, Stance { start: 110.0, end: 200.0 }]);
-        let short = ok.replace("4.5", "4.0");
-        assert!(Gait::new(&scenario(&short), &names(), 1.0).unwrap_err().to_string().contains("horizon"));
+        for (from, to, key) in [
+            ("5.0, 0.5, 4.5", "5.0, 5.0", "gait.phases[0]: given 2 durations"),
+            ("5.0, 0.5, 4.5", "5.0, 0.05, 4.95", "gait.phases[0][1]: given 0.05 s"),
+            (", [10.0]]", "]", "gait.phases: "),
+        ] {
+            let message = Gait::new(&scenario(&ok.replace(from, to)), &names(), 1.0).unwrap_err().to_string();
+            assert!(message.starts_with(key), "{message}");
+        }
     }
 }

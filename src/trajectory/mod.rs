@@ -11,6 +11,7 @@ pub mod phase;
 pub mod rotation;
 pub mod sampling;
 pub mod space;
+pub mod spaces;
 pub mod spline;
 pub mod switches;
 
@@ -19,3 +20,4 @@ pub use instant::Instant;
 pub use layout::Layout;
 pub use node::LinearNode;
 pub use phase::{Stance, Swing};
+pub use spaces::Spaces;

@@ -1,5 +1,7 @@
 //! The space that the variables live in: F, pushed forward by φ, or ambient space itself (φ = identity).
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::rotation::{self, RotationJet};
@@ -11,7 +13,7 @@ pub enum Space {
     /// The baseline: variables are ambient quantities.
     Direct,
     /// Variables are pulled back by φ (Eq. 7).
-    Warped(Box<WarpMap>),
+    Warped(Arc<WarpMap>),
 }
 
 /// φ at a point with its derivatives as matrices.

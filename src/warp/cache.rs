@@ -72,7 +72,7 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
     for v in grid.origin.iter().chain(&grid.spacing).chain(field.samples()) {
         hash.update(v.to_le_bytes());
     }
-    digest::hex(hash)
+    digest::hex(&hash.finalize())
 }
 
 /// The map in a cache file; none if there is no such file or it is not whole.

@@ -1,17 +1,14 @@
 //! Motions and hand-made plans for the tests.
-#![allow(dead_code, reason = "each test crate uses its own part")]
 
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use warpgait::heightfield::Heightfield;
+use warpgait::pipeline::Prepared;
 use warpgait::plan::sampled::Provenance;
 use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan};
-use warpgait::planner::{Host, Motion, Progress, Seconds, Task, solve};
-use warpgait::robot::{Box3, Robot};
-use warpgait::scenario::{Formulation, Scenario};
-use warpgait::trajectory::Gait;
+use warpgait::planner::{Host, Motion, Progress, Seconds, solve};
+use warpgait::robot::Box3;
+use warpgait::scenario::{Formulation, Scenario, load_text};
 use warpgait::warp::{self, WarpMap};
 
 /// Never asks to stop, and builds the maps of continuations anew.
@@ -29,23 +26,14 @@ impl Host for Patient<'_> {
 
 /// Solves a scenario given as text, its map made anew, and samples the motion.
 pub fn solved(text: &str) -> (Motion, Plan) {
-    let scenario: Scenario = toml::from_str(text).expect("a scenario");
-    let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
-    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
-    let field = Arc::new(ground.field.clone());
-    let map = (scenario.formulation == Formulation::Warped)
-        .then(|| warp::build(&field, &scenario.map, &mut |_| ControlFlow::Continue(())).expect("a map").0);
-    let gait = Gait::of(&scenario, &robot).expect("a gait");
-    let task = Task { scenario: &scenario, robot: &robot, gait: &gait, ground: &field, map: map.as_ref() };
-    let motion = solve(&task, &mut Patient(&scenario)).expect("a motion");
-    let provenance = Provenance {
-        scenario: &scenario,
-        text,
-        robot: &robot,
-        ground: &ground,
-        inputs: BTreeMap::new(),
-        map_seconds: 0.0,
-    };
+    let loaded = load_text("scenario", text, ".".as_ref(), &[]).expect("a scenario");
+    let scenario = &loaded.scenario;
+    let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
+    let build = || warp::build(&prepared.surface, &scenario.map, &mut |_| ControlFlow::Continue(()));
+    let map = (scenario.formulation != Formulation::Direct).then(|| build().expect("a map").0);
+    let task = prepared.task(&loaded, map.as_ref());
+    let motion = solve(&task, &mut Patient(scenario)).expect("a motion");
+    let provenance = Provenance { loaded: &loaded, ground: &prepared.ground, map_seconds: 0.0 };
     let plan = Plan::from_motion(&motion, &provenance);
     (motion, plan)
 }
@@ -114,8 +102,10 @@ pub fn standing() -> Plan {
             schema: 1,
             warpgait_version: "0.1.0".into(),
             created: "2024-01-01T00:00:00Z".into(),
-            formulation: "direct".into(),
+            formulation: Formulation::Direct,
             sample_rate_hz: 200.0,
+            scenario_source: String::new(),
+            overrides: Vec::new(),
             scenario: SCENARIO.into(),
             robot: MetaRobot {
                 name: "anymal_towr".into(),

@@ -1,10 +1,10 @@
-"""A small data set of reference motions: walks from one place to several goals, planned, checked, replayed on the full robot.
+"""Makes a small data set of reference motions: walks to several goals, planned, checked, and replayed on the full robot.
 
     .venv/bin/python validate/examples/dataset.py walks.npz
 
-Keeps the joint trajectories of those that the robot walks, M motions of K samples at 250 Hz:
+It keeps the joint trajectories of the walks that the robot can track, M motions of K samples at 250 Hz:
 `q`, `qd`, `tau` (M, K, 12) rad, rad/s, N m in the order of `joint_names`; `base_position` (M, K, 3) m, `base_quaternion_wxyz` (M, K, 4);
-`foot_contact` (M, K, 4); `goal` (M, 2) m. The plans themselves and the reports of their replays lie beside it.
+`foot_contact` (M, K, 4); `goal` (M, 2) m. The plans and the reports of their replays are beside the data set.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from warpgait.validate import main as validate
 
 SCENARIO = """
 schema = 1
-formulation = "direct"              # quick; "warped" for rough ground
+formulation = "direct"              # fast; "warped" for rough ground
 horizon = 3.0                       # s
 
 [robot]
@@ -39,7 +39,7 @@ MEMBERS = ("q", "qd", "tau", "base_position", "base_quaternion_wxyz", "foot_cont
 
 
 def make(target: Path, count: int) -> int:
-    """Walks to `count` goals on a circle; returns how many went into `target`."""
+    """Plan and replay walks to `count` goals on a circle; returns how many were written to `target`."""
     target.parent.mkdir(parents=True, exist_ok=True)
     motions: list[dict[str, Any]] = []
     for i, angle in enumerate(np.linspace(0.0, np.pi, count)):
@@ -50,7 +50,7 @@ def make(target: Path, count: int) -> int:
             continue
         plan = target.with_name(f"{target.stem}-{i}.plan.npz")
         trajectory.save(plan)
-        # As on the command line; 0: the robot walks it. Leaves NAME.report.json, NAME.report.html and NAME.replay.npz.
+        # As on the command line; 0 means that the robot tracks the plan. Writes NAME.report.json, NAME.report.html and NAME.replay.npz.
         if validate([str(plan), "--no-second-opinion", "--no-pictures", "--quiet"]) != 0:
             print(f"{goal}: not trackable, see {target.stem}-{i}.report.html")
             continue

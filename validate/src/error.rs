@@ -9,7 +9,7 @@ pyo3::import_exception!(warpgait.errors, InputError);
 /// What a user can act on is an `InputError` (a `ValueError`), the rest a `RuntimeError`.
 pub fn exception(error: Error) -> PyErr {
     match error {
-        Error::Input(_) | Error::Io { .. } => InputError::new_err(error.to_string()),
+        Error::Input(_) | Error::Key { .. } | Error::Io { .. } => InputError::new_err(error.to_string()),
         Error::Internal(_) => PyRuntimeError::new_err(error.to_string()),
     }
 }

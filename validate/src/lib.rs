@@ -1,8 +1,7 @@
 //! The native side of the Python package `warpgait`: plans evaluated exactly, the terrain, and solving.
 //!
-//! What each function does for its users, with shapes and units, is said twice, as `help` shows the one and editors the other: here and in
-//! `python/warpgait/_native.pyi`; a test compares them. Every array is a new one, in C order; the interpreter lock is released while
-//! there is something to compute.
+//! The documentation of each function, with shapes and units, stands here, where `help` finds it, and in `python/warpgait/_native.pyi`,
+//! where editors find it. A test compares the two. Every array is new and in C order. The interpreter lock is released during computation.
 
 mod arrays;
 mod error;

@@ -16,8 +16,8 @@ use crate::trajectory::Trajectory;
 ///
 /// `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
 /// `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
-/// iteration of the nonlinear program; what it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile;
-/// of several solves in one process, one runs at a time. A solve that does not converge is no error: see `solved` and `passed`.
+/// iteration of the nonlinear program. An exception that it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run
+/// meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
 #[pyfunction]
 #[pyo3(signature = (scenario, *, overrides = None, progress = None))]
 pub fn solve(
@@ -57,7 +57,7 @@ pub fn solve(
     }
 }
 
-/// Hears of Ctrl-C, and tells the caller of an iteration.
+/// Checks for Ctrl-C, and reports an iteration to the caller.
 fn tell(py: Python<'_>, event: &Event, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
     if let (Event::Iteration(at), Some(progress)) = (event, progress) {

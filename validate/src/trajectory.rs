@@ -19,9 +19,9 @@ use crate::terrain::Terrain;
 /// The base at times of shape (…), in the world frame.
 #[pyclass(frozen, get_all, module = "warpgait")]
 pub struct BaseMotion {
-    /// (…, 3) centre of mass, m.
+    /// (…, 3) center of mass, m.
     position: Py<PyArrayDyn<f64>>,
-    /// (…, 4) body to world, unit, with the sign of the plan's samples nearby.
+    /// (…, 4) body to world, unit, with the same sign as the nearest sample of the plan.
     quaternion_wxyz: Py<PyArrayDyn<f64>>,
     /// (…, 3) m/s.
     linear_velocity: Py<PyArrayDyn<f64>>,
@@ -44,13 +44,13 @@ pub struct FeetMotion {
     acceleration: Py<PyArrayDyn<f64>>,
     /// (…, E, 3) of the ground on the robot, N.
     force: Py<PyArrayDyn<f64>>,
-    /// (…, E) in stance; a foot that lifts off or touches down at this very time counts as standing.
+    /// (…, E) in stance; a foot that lifts off or touches down at exactly this time counts as in stance.
     contact: Py<PyArrayDyn<bool>>,
     /// (…, E, 3) unit normal of the terrain under the foot.
     normal: Py<PyArrayDyn<f64>>,
 }
 
-/// A plan as the splines that were optimised: exact at any time, not interpolated between samples.
+/// A plan as the optimized splines: exact at any time, not interpolated between samples.
 #[pyclass(frozen, module = "warpgait")]
 pub struct Trajectory {
     plan: Plan,
@@ -64,7 +64,7 @@ impl Trajectory {
         Ok(Self { plan, motion, ground })
     }
 
-    /// The plan's sample nearest to a time: its quaternion has the sign that those between are to have too.
+    /// The quaternion of the plan's sample nearest to a time; quaternions between the samples get its sign.
     fn quaternion_near(&self, t: f64) -> [f64; 4] {
         let last = self.plan.base_quaternion_wxyz.len() - 1;
         let n = (t / self.motion.duration() * last as f64).round() as usize;
@@ -92,7 +92,7 @@ impl Trajectory {
         PyTuple::new(py, &self.plan.foot_names)
     }
 
-    /// The ground as planned on.
+    /// The ground that the plan was made for.
     #[getter]
     fn terrain(&self) -> Terrain {
         Terrain(self.ground.clone())
@@ -104,13 +104,13 @@ impl Trajectory {
         self.plan.meta.solver.success
     }
 
-    /// Every check in the plan holds: each law again, from the samples alone.
+    /// Every check in the plan holds. The checks compute each law again from the samples alone.
     #[getter]
     fn passed(&self) -> bool {
         self.plan.meta.checks.iter().all(|row| row.passed)
     }
 
-    /// The plan's member `meta`: scenario, robot, solver, checks, inputs.
+    /// The plan's member `meta`: scenario, robot, limits, solver, checks, inputs.
     #[getter]
     fn meta<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text =
@@ -175,7 +175,7 @@ impl Trajectory {
     }
 }
 
-/// Read a plan file; one that is damaged or has no splines is refused with file, member and reason.
+/// Read a plan file. A damaged file, or one without splines, is refused with file, member and reason.
 #[pyfunction]
 pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Trajectory> {
     let named = |error| match error {

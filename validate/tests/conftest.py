@@ -1,4 +1,4 @@
-"""Plans shared by the tests; made once a session."""
+"""Plans that tests share, made once per session."""
 
 from pathlib import Path
 

@@ -1,5 +1,6 @@
 """The command: files, exit codes, messages."""
 
+import importlib.metadata
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 import crawl
 from warpgait import film
+from warpgait.settings import MUJOCO_VERSION
 from warpgait.validate import main
 
 
@@ -57,8 +59,8 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     other = crawl.altered(standing_plan, tmp_path / "towr.plan.npz", rename)
     assert main([str(other)]) == 2
     assert "no full model" in capsys.readouterr().err
-    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file
-    assert "no folder for the reports" in capsys.readouterr().err
+    assert main([str(standing_plan), "-o", str(other)]) == 2  # a file, not a folder
+    assert "cannot make this folder for the reports" in capsys.readouterr().err
     assert json.loads((tmp_path / "towr.report.json").read_text())["verdict"] == "error"
     assert main([str(other), "--model", "anymal_b", "--no-pictures", "--no-second-opinion"]) == 0
     before = sorted(standing_plan.parent.iterdir())
@@ -75,15 +77,15 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     assert sorted(standing_plan.parent.iterdir()) == before  # a report of an earlier run stays
 
 
-def test_an_error_of_the_program_is_no_verdict(
+def test_a_bug_is_not_a_verdict(
     standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("warpgait.validation.analyse", lambda *_: 1 / 0)
+    monkeypatch.setattr("warpgait.validation.analyze", lambda *_: 1 / 0)
     assert main([str(standing_plan), "-o", str(tmp_path)]) == 2
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-def test_output_that_nobody_reads_leaves_the_verdict_alone(standing_plan: Path, tmp_path: Path) -> None:
+def test_a_closed_standard_output_does_not_change_the_verdict(standing_plan: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-pictures"]
     run = subprocess.Popen([*command, "--no-second-opinion"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None and run.stderr is not None
@@ -102,8 +104,8 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
     assert "libegl1" in (tmp_path / "stand.report.html").read_text()
 
 
-def test_an_opengl_that_is_missing_costs_the_pictures_only(standing_plan: Path, tmp_path: Path) -> None:
-    """MuJoCo itself cannot be imported with such a setting."""
+def test_a_missing_opengl_loses_only_the_pictures(standing_plan: Path, tmp_path: Path) -> None:
+    """With this setting, MuJoCo itself cannot be imported."""
     command = [sys.executable, "-m", "warpgait.validate", str(standing_plan), "-o", str(tmp_path), "--no-second-opinion"]
     environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -111,13 +113,17 @@ def test_an_opengl_that_is_missing_costs_the_pictures_only(standing_plan: Path, 
     assert "No pictures" in done.stderr and "libosmesa6" in done.stderr
 
 
-def test_without_ffmpeg_a_film_is_refused_kindly(
+def test_without_ffmpeg_there_is_a_message_and_no_film(
     standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(film, "ffmpeg", lambda: None)
     assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion", "--no-pictures", "--video"]) == 0
     assert "ffmpeg" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_the_package_requires_the_version_of_mujoco_that_it_was_calibrated_with() -> None:
+    assert f"mujoco=={MUJOCO_VERSION}" in (importlib.metadata.requires("warpgait") or [])
 
 
 def test_a_missing_mujoco_is_a_message(standing_plan: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The examples run, and what they leave is what they say."""
+"""The examples run, and their results are as documented."""
 
 import runpy
 from pathlib import Path
@@ -19,4 +19,4 @@ def test_the_data_set_holds_joint_trajectories_that_lead_to_the_goals(tmp_path: 
         speed = np.gradient(walks["q"], 1 / 250, axis=1)
         assert np.sqrt(np.mean((speed - walks["qd"]) ** 2)) < 0.1  # rad/s
         way = walks["base_position"][:, -1, :2] - walks["base_position"][:, 0, :2]
-        assert way == pytest.approx(walks["goal"], abs=0.06)  # of the trunk; goals are of the centre of mass
+        assert way == pytest.approx(walks["goal"], abs=0.06)  # of the trunk; goals are for the center of mass

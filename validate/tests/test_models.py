@@ -1,4 +1,4 @@
-"""Models against their sources, closed-form kinematics against MuJoCo, boxes against brute force."""
+"""Compares models with their sources, closed-form kinematics with MuJoCo, and boxes with brute force."""
 
 import sysconfig
 import tomllib
@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpgait import InputError
+from warpgait.arrays import Array
 from warpgait.kinematics import legs
 from warpgait.model import find_model, foot_names, indices, load_spec, stand
-from warpgait.plan import Array
 from warpgait.reach import largest_cuboid
 from warpgait.robots import derive, to_toml
 
@@ -27,18 +27,18 @@ URDF = {
 
 
 def urdf_of(name: str) -> Path:
-    """The URDF inside the package example-robot-data, or a skipped test."""
+    """The URDF in the package example-robot-data; skips the test if it is not installed."""
     site = Path(sysconfig.get_paths()["purelib"])
     found = [*site.glob(f"cmeel.prefix/share/example-robot-data/robots/{URDF[name]}")]
     if not found:
         pytest.skip(
-            "example-robot-data is not installed (pip install 'warpgait[urdf]', 131 MB): models not compared with the URDF"
+            "example-robot-data is not installed (pip install 'warpgait[urdf]', 131 MB): models are not compared with the URDF"
         )
     return found[0]
 
 
 class Urdf:
-    """A URDF with links that move together merged: per moving link mass, centre, inertia; per joint place and limits; zero pose."""
+    """A URDF at zero joint angles, with rigidly connected links merged: mass, center and inertia of moving links, places and limits of joints."""
 
     def __init__(self, path: Path) -> None:
         root = ET.parse(path).getroot()
@@ -193,10 +193,10 @@ def test_the_nominal_feet_stand_well_inside_their_boxes(name: str) -> None:
         off = np.abs(np.subtract(foot["nominal"], foot["reach"]["center"])) / foot["reach"]["half_size"]
         assert (off < 0.5).all(), foot["name"]
     torso = robot["torso"]
-    assert torso["center"][2] - torso["half_size"][2] > robot["feet"][0]["nominal"][2] + 0.25  # belly clear of the ground
+    assert torso["center"][2] - torso["half_size"][2] > robot["feet"][0]["nominal"][2] + 0.25  # the trunk is clear of the ground
 
 
-def test_a_robot_without_a_model_is_refused_with_what_would_serve() -> None:
+def test_a_robot_without_a_model_is_refused_and_the_message_names_alternatives() -> None:
     with pytest.raises(InputError) as caught:
         find_model("anymal_towr")
     for word in ("anymal_towr", "anymal_b", "anymal_c", "--model"):

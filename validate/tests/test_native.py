@@ -1,4 +1,4 @@
-"""The native side: plans evaluated exactly, terrain, and solving with progress, Ctrl-C and clear refusals."""
+"""The compiled part: exact evaluation of plans, terrain, and solving with progress, Ctrl-C and clear errors."""
 
 import ast
 import inspect
@@ -16,9 +16,9 @@ import pytest
 import warpgait
 from crawl import altered
 from warpgait import _native
-from warpgait.plan import load as load_samples
+from warpgait.plan import read_plan
 
-# A short trot over ripples; a few iterations make a motion with everything in it, though not a solved one.
+# A short trot over ripples. A few iterations give a motion with stances, swings and forces that is not solved.
 SCENARIO = """
 schema = 1
 formulation = "direct"
@@ -47,7 +47,7 @@ def trajectory(request: pytest.FixtureRequest) -> warpgait.Trajectory:
 def test_the_exact_motion_goes_through_the_samples_of_the_file(trajectory: warpgait.Trajectory, tmp_path: Path) -> None:
     path = tmp_path / "a.plan.npz"
     trajectory.save(path)
-    plan, exact = load_samples(path), warpgait.load(path)
+    plan, exact = read_plan(path), warpgait.load(path)
     assert exact.foot_names == plan.foot_names == ("LF", "RF", "LH", "RH")
     assert exact.duration == pytest.approx(plan.duration) == 2.0
     assert (exact.t == plan.t).all()
@@ -128,7 +128,7 @@ def test_a_feasible_plan_with_progress(tmp_path: Path) -> None:
     assert [row[0] for row in rows] == list(range(len(rows)))
     assert rows[-1][1] < 1e-3 < rows[0][1]
     assert trajectory.meta["inputs"].keys() == {"flat.toml"}
-    # The plan's scenario holds what was set, and gives the same problem again.
+    # The plan's scenario contains the overrides, so it gives the same problem again.
     assert 'effort = "feasible"' in trajectory.meta["scenario"]
 
 
@@ -201,14 +201,14 @@ def test_an_exception_in_progress_ends_the_solve() -> None:
 
 
 @pytest.fixture
-def heard_ctrl_c() -> Iterator[None]:
-    """Python's own answer to Ctrl-C: a shell that starts tests in the background has it ignored."""
+def default_ctrl_c() -> Iterator[None]:
+    """Python's own handler of Ctrl-C; a shell that starts tests in the background makes them ignore it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.usefixtures("heard_ctrl_c")
+@pytest.mark.usefixtures("default_ctrl_c")
 def test_ctrl_c_ends_the_solve_and_the_next_one_works() -> None:
     def progress(iteration: int, violation: float, objective: float) -> None:
         if iteration == 1:
@@ -236,12 +236,12 @@ def test_other_threads_run_during_a_solve() -> None:
     warpgait.solve(SCENARIO, overrides={"solver.max_iterations": 10})
     done.set()
     thread.join()
-    # Were the lock held, the thread would have slept through the solve.
+    # If the solve held the interpreter lock, the thread would have waited for its end.
     assert max(spans) < 0.5 * (time.perf_counter() - started)
 
 
-def test_help_says_what_editors_say() -> None:
-    """The stub file and the compiled documentation are the same, for everything there is."""
+def test_the_stub_file_has_the_compiled_documentation() -> None:
+    """`help` shows the one, editors show the other."""
     stub = ast.parse((Path(warpgait.__file__).parent / "_native.pyi").read_text(encoding="utf-8"))
     compared = 0
     for item in stub.body:

@@ -1,4 +1,4 @@
-"""Plans are read, or refused with file, member and reason."""
+"""Plans are read, or refused with file, member and reason; and they are sampled at the control rate."""
 
 import json
 from collections.abc import Callable
@@ -11,17 +11,32 @@ import pytest
 
 from crawl import altered
 from warpgait import InputError
-from warpgait.plan import load
+from warpgait.plan import read_plan
 from warpgait.reference import sample
 
 
 def test_a_plan_is_read(standing_plan: Path) -> None:
-    plan = load(standing_plan)
+    plan = read_plan(standing_plan)
     assert plan.foot_names == ("LF", "RF", "LH", "RH")
     assert plan.duration == pytest.approx(1.0)
     assert plan.robot.name == "anymal_b"
     assert plan.foot_force[:, :, 2].sum(1) == pytest.approx(plan.weight, rel=1e-3)
-    assert plan.pull_limit == 1.2  # the default: its scenario says nothing
+    assert plan.pull_limit == 0.0  # no foot is adhesive
+
+
+def adhesive(**meta_changes: Any) -> Callable[[dict[str, Any]], None]:
+    """All feet become adhesive, and keys of meta change."""
+
+    def change(a: dict[str, Any]) -> None:
+        a["foot_adhesive"] = np.ones(4, bool)
+        a["meta"] = meta(**meta_changes)(a["meta"])
+
+    return change
+
+
+def test_the_pull_limit_is_the_plans(standing_plan: Path, tmp_path: Path) -> None:
+    plan = altered(standing_plan, tmp_path / "sticky.plan.npz", adhesive(limits={"pull_limit": 0.9}))
+    assert read_plan(plan).pull_limit == 0.9
 
 
 def poke(member: str, value: Any) -> Callable[[dict[str, Any]], None]:
@@ -54,20 +69,22 @@ def meta(**changes: Any) -> Callable[[Any], Any]:
         (poke("meta", meta(schema="one")), ["schema"]),
         (poke("meta", meta(robot={"name": "anymal_b"})), ["robot", "mass"]),
         (poke("meta", meta(robot=[])), ["robot"]),
+        (adhesive(limits={}), ["meta", "limits.pull_limit", "solve it again"]),
+        (adhesive(limits={"pull_limit": "strong"}), ["limits.pull_limit", "strong"]),
     ],
 )
 def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: Any, words: list[str]) -> None:
     bad = altered(standing_plan, tmp_path / "bad.plan.npz", change)
     with pytest.raises(InputError) as caught:
-        load(bad)
+        read_plan(bad)
     for word in ["bad.plan.npz", *words]:
         assert word in str(caught.value)
 
 
-def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) -> None:
+def test_files_that_are_not_plans_are_refused(standing_plan: Path, tmp_path: Path) -> None:
     whole = standing_plan.read_bytes()
     for name, content, words in (
-        ("half", whole[: len(whole) // 2], "cut short"),
+        ("half", whole[: len(whole) // 2], "truncated"),
         ("empty", b"", "an empty file"),
         ("text", b"hello", "not an .npz archive; a plan is a"),
         ("rot", whole[:2000] + b"x" * 500 + whole[2500:], "damaged"),
@@ -75,31 +92,31 @@ def test_what_is_no_plan_at_all_is_refused(standing_plan: Path, tmp_path: Path) 
         path = tmp_path / f"{name}.plan.npz"
         path.write_bytes(content)
         with pytest.raises(InputError, match=f"{name}.*{words}"):
-            load(path)
+            read_plan(path)
     with pytest.raises(InputError, match="a folder"):
-        load(tmp_path)
+        read_plan(tmp_path)
     with pytest.raises(InputError, match="no such file"):
-        load(tmp_path / "missing.plan.npz")
+        read_plan(tmp_path / "missing.plan.npz")
     np.save(tmp_path / "array.npy", np.zeros(3))
     with pytest.raises(InputError, match="single NumPy array"):
-        load(tmp_path / "array.npy")
+        read_plan(tmp_path / "array.npy")
 
 
 def test_the_reference_goes_through_the_samples(ripple_plan: Path) -> None:
-    plan = load(ripple_plan)
+    plan = read_plan(ripple_plan)
     reference = sample(plan, 1.0 / plan.t[1], 0.03)
     assert np.allclose(reference.com, plan.base_position)
     assert np.allclose(reference.foot, plan.foot_position + 0.03 * plan.center_direction)
     assert (reference.contact == plan.foot_contact).all()
     between = sample(plan, 500.0, 0.03)
-    # The velocity it reports is that of the positions it reports, between the plan's samples too.
+    # Between the plan's samples too, its velocities are those of its positions.
     moved = np.gradient(between.foot, between.t, axis=0)
     assert np.abs(moved - between.foot_velocity)[2:-2].max() < 0.02
     assert between.t[-1] == pytest.approx(plan.duration)
 
 
-def test_feet_do_not_follow_every_stone_that_they_pass(ripple_plan: Path) -> None:
-    plan = load(ripple_plan)
+def test_swinging_feet_ignore_the_normals_of_the_ground_below(ripple_plan: Path) -> None:
+    plan = read_plan(ripple_plan)
     rng = np.random.default_rng(0)
     shaken = np.where(plan.foot_contact[..., None], plan.foot_normal, rng.normal(size=plan.foot_normal.shape))
     direction = replace(plan, foot_normal=shaken).center_direction

@@ -1,15 +1,15 @@
-"""Joint speeds and torques that the planner bounds, against MuJoCo's kinematics of the full model."""
+"""Joint speeds and torques that the planner limits, computed again with MuJoCo's kinematics of the full model."""
 
 import mujoco
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import warpgait
+from warpgait.geometry import rotation_from_wxyz
 from warpgait.kinematics import legs
 from warpgait.model import composite, find_model, indices, load_spec, stand
 
-# Fast and up a slope, so that both limits matter.
+# Fast and up a slope, so that both limits are active.
 SCENARIO = """
 schema = 1
 formulation = "direct"
@@ -30,7 +30,7 @@ position = [0.2, 0.0]
 @pytest.mark.parametrize("known", [True, False])
 def test_planned_joints_keep_their_limits_in_mujoco(known: bool, tmp_path: object) -> None:
     robot = find_model("anymal_c").with_suffix(".toml").read_text()
-    if not known:  # the same robot, of whose legs the planner knows nothing
+    if not known:  # the same robot without data on its legs
         lines = robot.split("\n")
         inside = [any(line.startswith(key) for key in LEG_KEYS) for line in lines]
         robot = "\n".join(line for line, leg in zip(lines, inside, strict=True) if not leg)
@@ -42,12 +42,12 @@ def test_planned_joints_keep_their_limits_in_mujoco(known: bool, tmp_path: objec
         file.write(scenario)
     plan = warpgait.solve(f"{folder}/slope.toml")
     assert plan.solved
-    speed, torque = shares(plan)
+    speed, torque = peak_fractions(plan)
     if known:
         assert speed < 0.9 and torque < 0.9, (speed, torque)
-        assert speed > 0.3 and torque > 0.3, (speed, torque)  # of something
+        assert speed > 0.3 and torque > 0.3, (speed, torque)  # the legs do work
     else:
-        assert max(speed, torque) > 0.9, (speed, torque)  # the rows are needed here
+        assert max(speed, torque) > 0.9, (speed, torque)  # without the constraints, a limit is exceeded
 
 
 LEG_KEYS = (
@@ -65,8 +65,8 @@ LEG_KEYS = (
 )
 
 
-def shares(plan: warpgait.Trajectory) -> tuple[float, float]:
-    """Greatest joint speed and greatest torque of a standing leg without mass, of their limits."""
+def peak_fractions(plan: warpgait.Trajectory) -> tuple[float, float]:
+    """Largest joint speed, and largest torque of a massless leg in stance, as fractions of their limits."""
     model = load_spec(find_model("anymal_c")).compile()
     data = mujoco.MjData(model)
     index = indices(model, plan.foot_names)
@@ -74,7 +74,7 @@ def shares(plan: warpgait.Trajectory) -> tuple[float, float]:
     center = composite(model, data).center_of_mass
     t = np.arange(0.0, plan.duration, 0.005)
     base, feet = plan.base(t), plan.feet(t)
-    rotation = Rotation.from_quat(base.quaternion_wxyz[:, [1, 2, 3, 0]]).as_matrix()
+    rotation = rotation_from_wxyz(base.quaternion_wxyz).as_matrix()
     local = np.einsum("nji,nej->nei", rotation, feet.position - base.position[:, None]) + center + [0, 0, index.radius]
     q = np.stack([leg.inverse(local[:, e])[0] for e, leg in enumerate(legs(model, index.feet))], 1)
     torque = np.zeros(q.shape)

@@ -1,4 +1,4 @@
-"""The replay's parts: terrain in its place, forces that add up, adhesion, a robot that falls."""
+"""The parts of a replay: terrain, contact forces, adhesion, falls."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import crawl
-from warpgait.metrics import Verdict
+from crawl import GRAVITY
+from warpgait.criteria import Verdict
 from warpgait.model import find_model
 from warpgait.openloop import centroidal_residual
-from warpgait.plan import Heightfield, load
-from warpgait.scene import Disturbance, build
-from warpgait.validation import Settings, validate
-
-GRAVITY = np.array([0.0, 0.0, -9.81])
+from warpgait.plan import Heightfield, read_plan
+from warpgait.scene import build_world
+from warpgait.settings import Disturbance, Settings
+from warpgait.validation import validate
 
 
 @pytest.mark.parametrize("spacing", [0.02, 0.1])
@@ -23,7 +23,7 @@ def test_the_ground_is_where_the_plan_has_it(spacing: float) -> None:
     x, y = np.arange(-1, 1.5, spacing), np.arange(-0.8, 0.4, spacing)
     heights = crawl.ripple(x[None, :], y[:, None]) - 0.3
     terrain = Heightfield(heights, np.array([x[0], y[0]]), np.array([spacing, spacing]))
-    world = build(find_model("anymal_c"), terrain, 0.6, GRAVITY)
+    world = build_world(find_model("anymal_c"), terrain, 0.6, GRAVITY)
     data = mujoco.MjData(world)
     data.qpos[2] = 50.0
     mujoco.mj_forward(world, data)
@@ -34,14 +34,14 @@ def test_the_ground_is_where_the_plan_has_it(spacing: float) -> None:
 
 
 def test_forces_of_a_standing_robot_carry_its_weight(standing_plan: Path) -> None:
-    found = validate(load(standing_plan), Settings(second_opinion=False))
+    found = validate(read_plan(standing_plan), Settings(second_opinion=False))
     assert found.verdict is Verdict.PASS
     force = found.trials[0].replay.force[100:].sum(1).mean(0)
     assert force == pytest.approx([0, 0, found.plan.weight], abs=0.01 * found.plan.weight)
 
 
-def test_the_plans_own_laws_hold_and_a_wrong_spin_is_seen(ripple_plan: Path) -> None:
-    plan = load(ripple_plan)
+def test_the_plans_own_laws_hold_and_an_unexplained_rotation_is_found(ripple_plan: Path) -> None:
+    plan = read_plan(ripple_plan)
     assert np.abs(centroidal_residual(plan)).max() < 0.01 * plan.weight
     shaken = plan.base_quaternion_wxyz.copy()
     angle = 0.02 * np.sin(2 * np.pi * 2.0 * plan.t)  # a 2 Hz roll that no force explains
@@ -60,14 +60,14 @@ def steep_plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_adhesive_feet_hold_on_a_slope_where_others_slide(steep_plan: Path, tmp_path: Path) -> None:
-    plan = load(steep_plan)
+    plan = read_plan(steep_plan)
     found = validate(plan, Settings(second_opinion=False))
     assert found.trials[0].verdict is Verdict.PASS, [m for m in found.trials[0].metrics if m.verdict]
-    total = found.trials[0].replay.force[100:].sum(1).mean(0)  # with the adhesion taken off, what is left carries the weight
+    total = found.trials[0].replay.force[100:].sum(1).mean(0)  # without the adhesion, the rest carries the weight
     assert total == pytest.approx([0, 0, plan.weight], abs=0.02 * plan.weight)
 
     plain = crawl.altered(steep_plan, tmp_path / "plain.plan.npz", lambda a: a.update(foot_adhesive=np.zeros(4, bool)))
-    assert validate(load(plain), Settings(second_opinion=False)).verdict is Verdict.FAIL
+    assert validate(read_plan(plain), Settings(second_opinion=False)).verdict is Verdict.FAIL
 
 
 @pytest.fixture(scope="module")
@@ -79,9 +79,9 @@ def wall_plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return crawl.make(path, height=crawl.slope(angle), steps=4, stride=0.06, tilt=np.deg2rad(angle), adhesive=feet, extent=box)
 
 
-def test_a_foot_that_is_to_pull_finds_a_wall_3_mm_deeper_than_planned(wall_plan: Path) -> None:
-    """Until it touches, its pull must not be counted on: that would throw the leg, away from the wall."""
-    plan = load(wall_plan)
+def test_a_pulling_foot_reaches_a_wall_3_mm_deeper_than_planned(wall_plan: Path) -> None:
+    """The controller must not rely on its pull before it touches; that would throw the leg away from the wall."""
+    plan = read_plan(wall_plan)
     pull = (plan.foot_force[:, 0] * plan.foot_normal[:, 0]).sum(-1)
     assert pull.min() < -100.0  # N, of LF, which steps last
     ground, hold = plan.terrain, plan.foot_position[-1, 0]
@@ -94,12 +94,12 @@ def test_a_foot_that_is_to_pull_finds_a_wall_3_mm_deeper_than_planned(wall_plan:
     assert found.trials[0].incidents == []
     assert found.trials[0].verdict is not Verdict.FAIL
     end = found.trials[0].replay.force[-100:, 0].mean(0) @ plan.foot_normal[-1, 0]
-    assert end == pytest.approx(pull[-1], abs=0.05 * plan.weight)  # and it does pull in the end
+    assert end == pytest.approx(pull[-1], abs=0.05 * plan.weight)  # it pulls in the end
 
 
 def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan: Path) -> None:
     push = (0.4, 0.5, 0.0, 900.0, 0.0)
-    found = validate(load(standing_plan), Settings(second_opinion=False, disturbance=Disturbance(push=push)))
+    found = validate(read_plan(standing_plan), Settings(second_opinion=False, disturbance=Disturbance(push=push)))
     assert found.verdict is Verdict.FAIL
     first = found.first_failure
     assert first is not None and 0.4 < first.time < 1.0
@@ -110,27 +110,26 @@ def test_a_simulation_that_blows_up_is_a_failure_not_a_crash(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     disturbance = Disturbance(push=(0.4, 0.1, 0.0, 1e12, 0.0))
-    found = validate(load(standing_plan), Settings(disturbance=disturbance))
+    found = validate(read_plan(standing_plan), Settings(disturbance=disturbance))
     assert found.verdict is Verdict.FAIL
     assert found.first_failure is not None and "blew up" in found.first_failure.what
-    assert list(tmp_path.iterdir()) == []  # MuJoCo would leave a log file here
+    assert list(tmp_path.iterdir()) == []  # no log file of MuJoCo
 
 
-def test_a_coarser_world_is_told_apart(standing_plan: Path) -> None:
-    """The raw heightfield is replayed too, and counts."""
-    plan = load(standing_plan)
+def test_a_rough_raw_terrain_is_replayed_and_counts(standing_plan: Path) -> None:
+    plan = read_plan(standing_plan)
     rough = plan.terrain.heights + 0.03 * np.sign(np.random.default_rng(0).standard_normal(plan.terrain.heights.shape))
     raw = Heightfield(rough, plan.terrain.origin, plan.terrain.spacing)
     found = validate(replace(plan, terrain_raw=raw), Settings(second_opinion=False))
     assert [t.name for t in found.trials] == ["closed loop", "closed loop, raw terrain"]
     assert found.trials[0].verdict is Verdict.PASS
     assert found.verdict is not Verdict.PASS
-    assert found.shown is found.trials[1]  # pictures and plots are of what went wrong
+    assert found.shown is found.trials[1]  # pictures and plots show the worse trial
 
 
 def test_a_foot_steps_over_an_edge_that_the_plan_does_not_know(tmp_path: Path) -> None:
-    """7 cm high, 5 cm before the foot; a foot that only follows its path stays 15 cm behind."""
-    plan = load(crawl.make(tmp_path / "edge.plan.npz", steps=2, stride=0.16, spacing=0.01))
+    """7 cm high, 5 cm in front of the foot. A foot that only follows its path stays 15 cm behind."""
+    plan = read_plan(crawl.make(tmp_path / "edge.plan.npz", steps=2, stride=0.16, spacing=0.01))
     ground, e = plan.terrain, plan.foot_names.index("RF")
     rows, columns = ground.heights.shape
     x = ground.origin[0] + ground.spacing[0] * np.arange(columns) - plan.foot_position[0, e, 0]

@@ -1,6 +1,6 @@
 """Plans gaits, evaluates plans exactly, and replays them on full robot models in MuJoCo.
 
-`solve` plans the motion of a scenario, `load` reads a plan; both give a `Trajectory`. The replay is `python -m warpgait.validate`.
+`solve` plans the motion of a scenario, and `load` reads a plan. Both return a `Trajectory`. `python -m warpgait.validate` replays a plan.
 """
 
 from ._native import BaseMotion, FeetMotion, Terrain, Trajectory, load, solve

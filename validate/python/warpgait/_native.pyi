@@ -1,7 +1,7 @@
-"""What is compiled from Rust (`validate/src`). World frame: x forward, y left, z up. SI units. E feet.
+"""The part that is compiled from Rust (`validate/src`). World frame: x forward, y left, z up. SI units. E feet.
 
-An argument `t` or `points` may be anything that NumPy takes for an array; results are new arrays. What cannot be used is refused with
-`InputError`, a `ValueError`; `RuntimeError` means that something inside failed.
+An argument `t` or `points` may be anything that NumPy converts to an array. Results are new arrays. Input that cannot be used raises
+`InputError`, a `ValueError`. `RuntimeError` means an internal failure.
 """
 
 from collections.abc import Callable
@@ -17,11 +17,11 @@ class BaseMotion:
 
     @property
     def position(self) -> npt.NDArray[np.float64]:
-        """(…, 3) centre of mass, m."""
+        """(…, 3) center of mass, m."""
 
     @property
     def quaternion_wxyz(self) -> npt.NDArray[np.float64]:
-        """(…, 4) body to world, unit, with the sign of the plan's samples nearby."""
+        """(…, 4) body to world, unit, with the same sign as the nearest sample of the plan."""
 
     @property
     def linear_velocity(self) -> npt.NDArray[np.float64]:
@@ -61,7 +61,7 @@ class FeetMotion:
 
     @property
     def contact(self) -> npt.NDArray[np.bool_]:
-        """(…, E) in stance; a foot that lifts off or touches down at this very time counts as standing."""
+        """(…, E) in stance; a foot that lifts off or touches down at exactly this time counts as in stance."""
 
     @property
     def normal(self) -> npt.NDArray[np.float64]:
@@ -69,7 +69,7 @@ class FeetMotion:
 
 @final
 class Terrain:
-    """The ground as planned on: a C² spline through the heights of the plan; beyond their rectangle it is extended."""
+    """The ground that the plan was made for: a C² spline through the plan's heights, extended beyond their rectangle."""
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -86,7 +86,7 @@ class Terrain:
 
 @final
 class Trajectory:
-    """A plan as the splines that were optimised: exact at any time, not interpolated between samples."""
+    """A plan as the optimized splines: exact at any time, not interpolated between samples."""
 
     @property
     def duration(self) -> float:
@@ -102,7 +102,7 @@ class Trajectory:
 
     @property
     def terrain(self) -> Terrain:
-        """The ground as planned on."""
+        """The ground that the plan was made for."""
 
     @property
     def solved(self) -> bool:
@@ -110,11 +110,11 @@ class Trajectory:
 
     @property
     def passed(self) -> bool:
-        """Every check in the plan holds: each law again, from the samples alone."""
+        """Every check in the plan holds. The checks compute each law again from the samples alone."""
 
     @property
     def meta(self) -> dict[str, Any]:
-        """The plan's member `meta`: scenario, robot, solver, checks, inputs."""
+        """The plan's member `meta`: scenario, robot, limits, solver, checks, inputs."""
 
     def base(self, t: npt.ArrayLike) -> BaseMotion:
         """The base at times t in s, of any shape (…); a time outside 0…`duration` is refused."""
@@ -126,7 +126,7 @@ class Trajectory:
         """Write the plan file, `NAME.plan.npz`."""
 
 def load(path: str | PathLike[str]) -> Trajectory:
-    """Read a plan file; one that is damaged or has no splines is refused with file, member and reason."""
+    """Read a plan file. A damaged file, or one without splines, is refused with file, member and reason."""
 
 def solve(
     scenario: str | PathLike[str],
@@ -138,6 +138,6 @@ def solve(
 
     `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
     `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
-    iteration of the nonlinear program; what it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile;
-    of several solves in one process, one runs at a time. A solve that does not converge is no error: see `solved` and `passed`.
+    iteration of the nonlinear program. An exception that it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run
+    meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
     """

@@ -1,7 +1,7 @@
-"""`python -m warpgait.calibrate PLAN…`: what every metric comes to for good plans, and for the same ones spoiled in six ways.
+"""`python -m warpgait.calibrate PLAN…`: the values of every metric for good plans, and for the same plans spoiled in six ways.
 
-The limits in `metrics.py` are to lie between the two. Prints two Markdown tables: every metric's values, and how each spoiling was judged;
-`--csv` keeps every value.
+The limits in `criteria.py` must lie between the two. Prints two Markdown tables: the values of every metric, and how each spoiling was
+judged. `--csv` writes every value to a file.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from .criteria import Criterion, Metric, Verdict
 from .errors import InputError
-from .metrics import Metric, Verdict
-from .plan import Plan, load
-from .scene import Disturbance
-from .validation import Settings, validate
+from .plan import Plan, read_plan
+from .settings import Disturbance, Settings
+from .validation import validate
 
 
 def _same(plan: Plan) -> Plan:
@@ -35,14 +35,19 @@ def _raised(plan: Plan) -> Plan:
     return replace(plan, base_position=plan.base_position + np.array([0.0, 0.0, 0.08]))
 
 
+def swap_contacts(plan: Plan, first: int, second: int) -> Plan:
+    """Swap the planned contacts of two feet."""
+    order = np.arange(len(plan.foot_names))
+    order[[first, second]] = second, first
+    return replace(plan, foot_contact=plan.foot_contact[:, order])
+
+
 def _swapped(plan: Plan) -> Plan:
-    """Of two feet: those whose schedules differ most, for those of a trot's diagonal pair are the same."""
+    """Swap the contacts of the two feet whose schedules differ most; diagonal feet of a trot have the same schedule."""
     contact = plan.foot_contact
     differ = (contact[:, :, None] != contact[:, None, :]).mean(0)
-    pair = list(np.unravel_index(differ.argmax(), differ.shape))
-    order = np.arange(len(plan.foot_names))
-    order[pair] = order[pair[::-1]]
-    return replace(plan, foot_contact=contact[:, order])
+    first, second = np.unravel_index(differ.argmax(), differ.shape)
+    return swap_contacts(plan, int(first), int(second))
 
 
 @dataclass(frozen=True)
@@ -66,36 +71,37 @@ SPOILINGS = (
 
 
 def measure(plan: Plan, spoiling: Spoiling) -> list[Metric]:
-    """All metrics that count."""
+    """The metrics that count, of a spoiled plan."""
     settings = Settings(second_opinion=False, raw=False, disturbance=spoiling.world)
-    found = validate(spoiling.change(plan), settings)
-    return found.metrics + [m for t in found.trials if t.counts for m in t.metrics]
+    return validate(spoiling.change(plan), settings).counted_metrics
 
 
-Values = dict[tuple[str, str], dict[str, list[float]]]  # by (layer, metric), by spoiling
+Key = tuple[str, str]  # layer, metric
+Values = dict[Key, dict[str, list[float]]]  # of every metric, by the name of the spoiling
 
 
-def table(values: Values, limits: dict[tuple[str, str], Metric]) -> list[str]:
-    """Lines of Markdown: limits, good plans' median and worst, each spoiling's median."""
+def table(values: Values, criteria: dict[Key, Criterion]) -> list[str]:
+    """Lines of Markdown: limits, the good plans' median and worst, the median of each spoiling."""
     lines = [
         f"| metric | unit | pass | marginal | as planned: median | worst | {' | '.join(s.name for s in SPOILINGS)} |",
         "| --- " * (6 + len(SPOILINGS)) + "|",
     ]
     for key, by_spoiling in values.items():
-        metric, good = limits[key], by_spoiling[GOOD.name]
-        worst = min(good) if metric.at_least else max(good)
+        criterion, good = criteria[key], by_spoiling[GOOD.name]
+        worst = min(good) if criterion.at_least else max(good)
         cells = [f"{np.nanmedian(by_spoiling[s.name]):.3g}" if by_spoiling[s.name] else "–" for s in SPOILINGS]
-        figures = [f"{metric.passes:g}", f"{metric.marginal:g}", f"{np.median(good):.3g}", f"{worst:.3g}", *cells]
-        lines.append(f"| {key[0]}: {key[1]} | {metric.unit} | {' | '.join(figures)} |")
+        figures = [f"{criterion.passes:g}", f"{criterion.marginal:g}", f"{np.median(good):.3g}", f"{worst:.3g}", *cells]
+        lines.append(f"| {key[0]}: {key[1]} | {criterion.unit} | {' | '.join(figures)} |")
     return lines
 
 
-Judged = dict[str, list[tuple[str, list[str]]]]  # by spoiling, for every plan: the verdict and the metrics that object to it
+# By the name of the spoiling, for every plan: the verdict, and the metrics that do not pass.
+Judged = dict[str, list[tuple[str, list[str]]]]
 
 
 def verdicts(judged: Judged) -> list[str]:
-    """Lines of Markdown: how often each spoiling passed, was marginal, failed; and which metrics object to how many of the plans."""
-    lines = ["| spoiling | pass | marginal | fail | objections |", "| --- " * 5 + "|"]
+    """Lines of Markdown: how often each spoiling passed, was marginal or failed, and the metrics that most often do not pass."""
+    lines = ["| spoiling | pass | marginal | fail | metrics that do not pass |", "| --- " * 5 + "|"]
     for name, plans in judged.items():
         counts = [sum(verdict == v.word for verdict, _ in plans) for v in Verdict]
         objections = Counter(metric for _, metrics in plans for metric in metrics)
@@ -104,36 +110,53 @@ def verdicts(judged: Judged) -> list[str]:
     return lines
 
 
+@dataclass
+class Measurements:
+    """Metrics of every plan, as it is and spoiled."""
+
+    values: Values = field(default_factory=lambda: defaultdict(lambda: defaultdict(list)))
+    judged: Judged = field(default_factory=lambda: {s.name: [] for s in (GOOD, *SPOILINGS)})
+    criteria: dict[Key, Criterion] = field(default_factory=dict)
+    rows: list[list[object]] = field(default_factory=list)  # of the CSV file
+
+    def add(self, plan: Plan, spoiling: Spoiling) -> Verdict:
+        """Measure one plan under one spoiling."""
+        metrics = measure(plan, spoiling)
+        verdict = max(m.verdict for m in metrics)
+        self.judged[spoiling.name].append((verdict.word, [m.name for m in metrics if m.verdict is not Verdict.PASS]))
+        for metric in metrics:
+            key = metric.layer, metric.name
+            self.criteria.setdefault(key, metric.criterion)
+            self.values[key][spoiling.name].append(metric.value)
+            self.rows.append([plan.path.name, spoiling.name, *key, metric.value, metric.criterion.unit, metric.verdict.word])
+        return verdict
+
+    def write_csv(self, target: Path) -> None:
+        """Every value, one in a row."""
+        head = ["plan", "spoiling", "layer", "metric", "value", "unit", "verdict"]
+        with target.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([head, *self.rows])
+
+
 def main(words: list[str] | None = None) -> int:
-    """Run the command; 0, or 2 on bad input."""
+    """Run the command; returns 0, or 2 on bad input."""
     parser = argparse.ArgumentParser(prog="python -m warpgait.calibrate", description=__doc__)
     parser.add_argument("plans", nargs="+", type=Path, metavar="NAME.plan.npz")
     parser.add_argument("--csv", type=Path, help="write every value to this file")
     options = parser.parse_args(words)
-    values: Values = defaultdict(lambda: defaultdict(list))
-    limits: dict[tuple[str, str], Metric] = {}
-    judged: Judged = {s.name: [] for s in (GOOD, *SPOILINGS)}
-    rows = []
+    found = Measurements()
     try:
         for path in options.plans:
-            plan = load(path)
+            plan = read_plan(path)
             for spoiling in (GOOD, *SPOILINGS):
-                metrics = measure(plan, spoiling)
-                verdict = max(m.verdict for m in metrics)
-                judged[spoiling.name].append((verdict.word, [m.name for m in metrics if m.verdict is not Verdict.PASS]))
+                verdict = found.add(plan, spoiling)
                 print(f"calibrate: {path.name}: {spoiling.name}: {verdict.word}", file=sys.stderr)
-                for metric in metrics:
-                    key = metric.layer, metric.name
-                    limits.setdefault(key, metric)
-                    values[key][spoiling.name].append(metric.value)
-                    rows.append([path.name, spoiling.name, *key, metric.value, metric.unit, metric.verdict.word])
         if options.csv:
-            with options.csv.open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows([["plan", "spoiling", "layer", "metric", "value", "unit", "verdict"], *rows])
+            found.write_csv(options.csv)
     except (InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print("\n".join([*table(values, limits), "", *verdicts(judged)]))
+    print("\n".join([*table(found.values, found.criteria), "", *verdicts(found.judged)]))
     return 0
 
 

@@ -1,7 +1,7 @@
 """Pictures and films of a replay.
 
-Rendering runs in a process of its own (`render.py`): MuJoCo chooses its OpenGL at import, and a driver that crashes must not
-take the report with it. EGL is tried first, then OSMesa; neither needs a display.
+Rendering runs in a process of its own (`render.py`), because MuJoCo chooses its OpenGL at import, and because a driver that crashes must
+not end the validation. EGL is tried first, then OSMesa; neither needs a display.
 """
 
 from __future__ import annotations
@@ -20,22 +20,25 @@ import numpy as np
 import numpy.typing as npt
 
 from .plan import Heightfield
-from .scene import build
+from .scene import build_world
 from .validation import Validation
 
 PICTURES, FRAMES_PER_SECOND = 6, 30
-STRIP_SIZE, FILM_SIZE = (480, 270), (640, 360)  # pixels
-CELL, AROUND = 0.05, 1.5  # m: terrain as drawn, and how far around the robot's way
-SHADOW = 1024  # pixels a side of the shadow's picture: without a GPU the usual 4096 take as long as all the rest
+PICTURE_SPAN = 0.02, 0.98  # fractions of the replay at the first and the last picture
+PICTURE_SIZE, FILM_SIZE = (480, 270), (640, 360)  # pixels
+DRAWN_CELL = 0.05  # m, of the terrain as drawn
+DRAWN_MARGIN = 1.5  # m of terrain that is drawn around the robot's path
+SHADOW_SIZE = 1024  # pixels, of the square shadow map: without a GPU, the usual 4096 take as long as all the rest
+TIME_LIMIT, TIME_LIMIT_OF_FILM = 60.0, 30.0  # s, and s more for each second of a film
 PACKAGES = "On Debian: apt install libegl1 libgl1-mesa-dri (or libosmesa6) for pictures, and ffmpeg for films."
 
 
 class FilmError(Exception):
-    """No pictures, and why."""
+    """Pictures or a film could not be made; the message says why."""
 
 
 def ffmpeg() -> str | None:
-    """The ffmpeg of the system, or that of the Python package imageio-ffmpeg."""
+    """The path of the system's ffmpeg, or of the one in the Python package imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found:
         return found
@@ -46,76 +49,89 @@ def ffmpeg() -> str | None:
 
 
 def _drawn_terrain(v: Validation) -> Heightfield:
-    """The terrain around the way, coarse: without a GPU a film of half a million triangles takes minutes."""
+    """The terrain around the robot's path, on a coarser grid: without a GPU, a film of half a million triangles takes minutes."""
     terrain = v.shown.terrain
     rows, columns = terrain.heights.shape
-    low = v.plan.base_position[:, :2].min(0) - AROUND
-    high = v.plan.base_position[:, :2].max(0) + AROUND
+    low = v.plan.base_position[:, :2].min(0) - DRAWN_MARGIN
+    high = v.plan.base_position[:, :2].max(0) + DRAWN_MARGIN
     first = np.clip(np.floor((low - terrain.origin) / terrain.spacing).astype(int), 0, [columns - 2, rows - 2])
     last = np.clip(np.ceil((high - terrain.origin) / terrain.spacing).astype(int), first + 1, [columns - 1, rows - 1])
-    every = np.minimum(np.maximum(1, np.floor(CELL / terrain.spacing + 1e-9).astype(int)), last - first)
+    every = np.minimum(np.maximum(1, np.floor(DRAWN_CELL / terrain.spacing + 1e-9).astype(int)), last - first)
     heights = terrain.heights[first[1] : last[1] + 1 : every[1], first[0] : last[0] + 1 : every[0]]
     return Heightfield(heights, terrain.origin + first * terrain.spacing, every * terrain.spacing)
 
 
 def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int], output: Path, seconds: float) -> None:
-    """Render the replay to look at, at `times` to `output` (an .mp4, or a folder of PNG files), in another process."""
-    trial = v.shown
-    r = trial.replay
-    at = np.minimum(np.searchsorted(r.t, times), len(r.t) - 1)
-    with tempfile.TemporaryDirectory() as folder:
-        model, frames = Path(folder) / "world.mjb", Path(folder) / "frames.npz"
-        robot, disturbance = v.plan.robot, v.settings.disturbance
-        world = build(v.model_path, _drawn_terrain(v), robot.friction, robot.gravity, disturbance=disturbance, cell=CELL)
-        world.vis.quality.shadowsize = SHADOW
-        mujoco.mj_saveModel(world, str(model), None)
-        points = trial.reference.foot[at] - v.index.radius * trial.reference.normal[at]
-        np.savez(
-            frames, qpos=r.qpos[at], look=trial.reference.com[at], point=points, force=trial.reference.force[at] / v.plan.weight
-        )
-        job = json.dumps(
-            {
-                "model": str(model),
-                "frames": str(frames),
-                "size": size,
-                "output": str(output),
-                "ffmpeg": ffmpeg(),
-                "frames_per_second": FRAMES_PER_SECOND,
-            }
-        )
-        complaint = ""
+    """Render the trial to look at, at `times` s, to `output` (an .mp4, or a folder of PNG files), within `seconds`."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _write_scene(v, times, folder)
+        job = {
+            "model": str(folder / "world.mjb"),
+            "frames": str(folder / "frames.npz"),
+            "size": size,
+            "output": str(output),
+            "ffmpeg": ffmpeg(),
+            "frames_per_second": FRAMES_PER_SECOND,
+        }
+        errors = ""
         for backend in [b] if (b := os.environ.get("MUJOCO_GL")) else ["egl", "osmesa"]:
-            environment = dict(os.environ, MUJOCO_GL=backend, PYTHONPATH=os.pathsep.join(sys.path))
-            try:
-                done = subprocess.run(
-                    [sys.executable, "-m", "warpgait.render", job],
-                    env=environment,
-                    capture_output=True,
-                    text=True,
-                    timeout=seconds,
-                    check=False,
-                )
-            except subprocess.TimeoutExpired:
-                raise FilmError(f"Rendering took longer than {seconds:.0f} s and was stopped.") from None
-            if done.returncode == 0:
+            error = _render_with(backend, json.dumps(job), seconds)
+            if error is None:
                 return
-            last = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-            complaint += f" {backend}: {last[0]}."
-        raise FilmError(f"No pictures: neither EGL nor OSMesa could render.{complaint} {PACKAGES}")
+            errors += f" {backend}: {error}."
+    raise FilmError(f"No pictures: neither EGL nor OSMesa could render.{errors} {PACKAGES}")
 
 
-def strip(v: Validation) -> list[tuple[float, bytes]]:
-    """A few pictures of the replay to look at, (time, PNG)."""
+def _write_scene(v: Validation, times: npt.NDArray[np.float64], folder: Path) -> None:
+    """The model and the frames of the trial to look at, for `render.py`."""
+    trial, robot = v.shown, v.plan.robot
+    world = build_world(
+        v.model_path,
+        _drawn_terrain(v),
+        robot.friction,
+        robot.gravity,
+        disturbance=v.settings.disturbance,
+        cell=DRAWN_CELL,
+    )
+    world.vis.quality.shadowsize = SHADOW_SIZE
+    mujoco.mj_saveModel(world, str(folder / "world.mjb"), None)
+    at = np.minimum(np.searchsorted(trial.replay.t, times), len(trial.replay.t) - 1)
+    np.savez(
+        folder / "frames.npz",
+        qpos=trial.replay.qpos[at],
+        look=trial.reference.com[at],
+        point=trial.reference.foot[at] - v.index.radius * trial.reference.normal[at],
+        force=trial.reference.force[at] / v.plan.weight,
+    )
+
+
+def _render_with(backend: str, job: str, seconds: float) -> str | None:
+    """Run `render.py` with one OpenGL; returns the last line of its error, or None."""
+    environment = dict(os.environ, MUJOCO_GL=backend, PYTHONPATH=os.pathsep.join(sys.path))
+    command = [sys.executable, "-m", "warpgait.render", job]
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        raise FilmError(f"Rendering timed out after {seconds:.0f} s.") from None
+    if done.returncode == 0:
+        return None
+    return (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+
+
+def pictures(v: Validation) -> list[tuple[float, bytes]]:
+    """A few pictures of the trial to look at, (time s, PNG)."""
     end = float(v.shown.replay.t[-1])
-    times = np.linspace(0.02, 0.98, PICTURES) * end
+    times = np.linspace(*PICTURE_SPAN, PICTURES) * end
     with tempfile.TemporaryDirectory() as folder:
-        _render(v, times, STRIP_SIZE, Path(folder), 60.0)
+        _render(v, times, PICTURE_SIZE, Path(folder), TIME_LIMIT)
         return [(float(t), (Path(folder) / f"{i}.png").read_bytes()) for i, t in enumerate(times)]
 
 
 def video(v: Validation, target: Path) -> None:
-    """The replay to look at, as an MP4 at its natural speed."""
+    """The trial to look at, as an MP4 at real speed."""
     if ffmpeg() is None:
         raise FilmError(f"No film: ffmpeg was not found. {PACKAGES} Or: pip install imageio-ffmpeg")
     end = float(v.shown.replay.t[-1])
-    _render(v, np.arange(int(end * FRAMES_PER_SECOND) + 1) / FRAMES_PER_SECOND, FILM_SIZE, target, 60.0 + 30.0 * end)
+    times = np.arange(int(end * FRAMES_PER_SECOND) + 1) / FRAMES_PER_SECOND
+    _render(v, times, FILM_SIZE, target, TIME_LIMIT + TIME_LIMIT_OF_FILM * end)

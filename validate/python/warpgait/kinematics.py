@@ -7,43 +7,46 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import Array, Bools
 from .errors import InputError
-from .model import JOINTS, Array
+from .model import JOINTS
+
+_LEAST_DROP = 1e-8  # m², the least squared distance of a reached foot from the HAA axis, in the leg's plane
+_TOLERANCE = 1e-6  # of the direction of a joint axis, and, in m, of the height of a hip
 
 
 def _wrap(angle: Array) -> Array:
-    """An angle into [-π, π)."""
+    """An angle wrapped to [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One leg, read off the model at zero joint angles. Lengths in m, base frame."""
+    """One leg, read from the model at zero joint angles. Lengths in m, base frame."""
 
     name: str
     hip: Array  # (3,) a point on the HAA axis
-    flexion_offset: float  # HFE before (+x) the HAA point
-    lateral: float  # foot beside (+y) the HAA axis
+    flexion_offset: float  # HFE forward (+x) of the HAA point
+    lateral: float  # foot to the left (+y) of the HAA axis
     thigh: float  # HFE to KFE, in the leg's plane
-    shank: float  # KFE to the foot's centre, in the leg's plane
-    thigh_zero: float  # rad, from -z towards +x, at zero joint angles
+    shank: float  # KFE to the foot's center, in the leg's plane
+    thigh_zero: float  # rad, from -z toward +x, at zero joint angles
     shank_zero: float
-    bend: float  # +1: the shank points further forward than the thigh (front legs), -1: the other way
+    bend: float  # +1: the shank points further forward than the thigh (front legs), -1: further back
     lower: Array  # (3,) rad
     upper: Array  # (3,) rad
 
-    def inverse(self, foot: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Joint angles (..., 3) for foot centres (..., 3) in the base frame, and whether the foot can be there at all.
+    def inverse(self, foot: Array) -> tuple[Array, Bools]:
+        """Joint angles (..., 3) for foot centers (..., 3) in the base frame, and whether the leg reaches them.
 
         Joint limits are not applied. Out of reach, the angles are those of the stretched or folded leg.
         """
         v = np.asarray(foot, float) - self.hip
         # Abduction brings the foot into the plane y = lateral; below the hip, hence the minus sign.
         drop2 = v[..., 1] ** 2 + v[..., 2] ** 2 - self.lateral**2
-        reachable = drop2 > 1e-8
-        z = -np.sqrt(np.maximum(drop2, 1e-8))
+        reachable = drop2 > _LEAST_DROP
+        z = -np.sqrt(np.maximum(drop2, _LEAST_DROP))
         haa = _wrap(np.arctan2(v[..., 2], v[..., 1]) - np.arctan2(z, self.lateral))
         # Two links in the plane.
         x = v[..., 0] - self.flexion_offset
@@ -51,7 +54,7 @@ class Leg:
         reachable &= np.abs(cosine) <= 1.0
         knee = self.bend * np.arccos(np.clip(cosine, -1.0, 1.0))
         thigh = np.arctan2(x, -z) - np.arctan2(self.shank * np.sin(knee), self.thigh + self.shank * np.cos(knee))
-        # A positive rotation about +y turns -z towards -x, so angles count down.
+        # A positive rotation about +y turns -z toward -x, hence the signs.
         hfe = _wrap(self.thigh_zero - thigh)
         kfe = _wrap(self.shank_zero - self.thigh_zero - knee)
         return np.stack([haa, hfe, kfe], -1), reachable
@@ -61,14 +64,14 @@ class Leg:
         q, _ = self.inverse(foot)
         return np.abs(_wrap(q[..., 2] - (self.shank_zero - self.thigh_zero)))
 
-    def within_limits(self, q: Array) -> npt.NDArray[np.bool_]:
-        """Whether joint angles (..., 3) keep the limits."""
-        ok: npt.NDArray[np.bool_] = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
+    def within_limits(self, q: Array) -> Bools:
+        """Whether joint angles (..., 3) are within the limits."""
+        ok: Bools = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
         return ok
 
 
 def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
-    """The legs that end in `feet`; refuses a model whose legs are built otherwise."""
+    """The legs that end in `feet`; refuses a model with another kind of leg."""
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
     mujoco.mj_forward(model, data)
@@ -76,7 +79,8 @@ def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
     for name in feet:
         ids = [model.joint(f"{name}_{j}").id for j in JOINTS]
         haa, hfe, kfe = (data.xanchor[i].copy() for i in ids)
-        if not np.allclose(data.xaxis[ids], [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=1e-6) or abs(hfe[2] - haa[2]) > 1e-6:
+        aligned = np.allclose(data.xaxis[ids], [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=_TOLERANCE)
+        if not aligned or abs(hfe[2] - haa[2]) > _TOLERANCE:
             raise InputError(f"leg {name}: the inverse kinematics needs joint axes x, y, y at zero joint angles and a level hip")
         foot = data.site(name).xpos.copy()
         upper, lower = kfe - hfe, foot - kfe

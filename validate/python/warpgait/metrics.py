@@ -1,62 +1,32 @@
-"""From what happened to numbers, from numbers to a verdict.
+"""From what happened to metrics and incidents.
 
-Limits: between what good plans of Table I and six spoilings of them come to (`warpgait.calibrate`; README). A metric passes up to
-`passes`, is marginal up to `marginal`, and fails beyond. Force metrics and the open loop are there because a whole-body controller tracks bad plans well: it repairs them silently.
+Force metrics and the open loop are there because a whole-body controller tracks a bad plan well: it silently corrects the plan's errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .model import Indices
+from . import criteria
+from .arrays import Array, Bools, since_start
+from .criteria import LEVER, Metric, Verdict
+from .model import Indices, foot_of
 from .openloop import OpenLoop
-from .plan import Array, Bools, Plan
+from .plan import Plan
 from .reference import Reference
 from .replay import Incident, Replay
 
-
-class Verdict(IntEnum):
-    """Ordered, so that the worst is the largest."""
-
-    PASS = 0
-    MARGINAL = 1
-    FAIL = 2
-
-    @property
-    def word(self) -> str:
-        """pass, marginal or fail."""
-        return self.name.lower()
-
-
-@dataclass(frozen=True)
-class Metric:
-    """One line of the report."""
-
-    layer: str  # open loop | closed loop
-    name: str
-    value: float
-    unit: str
-    passes: float  # limit for a pass
-    marginal: float  # limit for marginal
-    at_least: bool = False  # the limits are lower bounds
-
-    @property
-    def verdict(self) -> Verdict:
-        """NaN fails."""
-        value, passes, marginal = (
-            (-self.value, -self.passes, -self.marginal) if self.at_least else (self.value, self.passes, self.marginal)
-        )
-        if value <= passes:
-            return Verdict.PASS
-        return Verdict.MARGINAL if value <= marginal else Verdict.FAIL
-
-
-LEVER = 0.3  # m: torques are judged against m g times this
+OPEN_LOOP = "open loop"
+FORCE_WINDOW = 0.02  # s: forces are averaged over this time, so that an impact of 2 ms does not hide the rest
+PATIENCE = 0.05  # s: a wrong contact or a saturated motor is an incident after this time
+SLIP_INCIDENT = 0.02  # m of slip in one stance
+SATURATED = 0.98  # fraction of the torque limit from which a motor counts as being at its limit
+LEAST_SPREAD = 1.0  # N, standard deviation below which a force is constant and a correlation means nothing
 
 
 def _rms(vectors: Any) -> float:
@@ -64,145 +34,160 @@ def _rms(vectors: Any) -> float:
     return float(np.sqrt((vectors**2).sum(-1).mean())) if vectors.size else float("nan")
 
 
-def _first(flags: Any) -> tuple[int, int] | None:
-    """Sample and foot of the first true entry of (N, E) flags."""
-    found = np.argwhere(flags)
-    return (int(found[0][0]), int(found[0][1])) if len(found) else None
+def _first_by_foot(layer: str, t: Array, feet: tuple[str, ...], found: Iterable[tuple[Any, str]]) -> list[Incident]:
+    """For each pair of flags (K, E) and words, an incident at the first true flag, if there is one."""
+    incidents = []
+    for flags, what in found:
+        at = np.argwhere(flags)
+        if len(at):
+            k, e = map(int, at[0])
+            incidents.append(Incident(float(t[k]), f"{layer}: {what}", feet[e]))
+    return incidents
 
 
-def open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric], list[Incident]]:
+def judge_open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric], list[Incident]]:
     """Metrics of the open loop, and what went wrong in it."""
     mg = plan.weight
-    layer = "open loop"
-    share = np.abs(result.torque) / index.torque_limit
+    torque = np.abs(result.torque) / index.torque_limit
     speed = np.abs(result.qvel[:, index.qvel]) / index.speed_limit
-    metrics = [
-        Metric(layer, "postures out of reach", float(result.unreachable.sum()), "", 0, 0),
-        Metric(layer, "postures past a joint limit", float(result.beyond_limits.sum()), "", 0, 0),
-        Metric(layer, "postures with other parts in the ground", float(len(result.in_ground)), "", 0, 0),
-        Metric(layer, "plan: unexplained force, rms", 100 * _rms(result.plan_residual[:, :3]) / mg, "% m g", 0.5, 5),
-        Metric(
-            layer, "plan: unexplained torque, rms", 100 * _rms(result.plan_residual[:, 3:]) / (mg * LEVER), "% m g·0.3 m", 0.5, 5
-        ),
-        Metric(layer, "full body: unexplained force, rms", _rms(result.body_residual[:, :3]) / mg, "m g", 0.05, 0.20),
-        Metric(
-            layer, "full body: unexplained torque, rms", _rms(result.body_residual[:, 3:]) / (mg * LEVER), "m g·0.3 m", 0.10, 0.20
-        ),
-        Metric(layer, "peak joint torque", float(share.max()), "of limit", 0.9, 1.0),
-        Metric(layer, "peak joint speed", float(speed.max()), "of limit", 0.9, 1.0),
-    ]
+    plan_force, plan_torque = result.plan_residual[:, :3], result.plan_residual[:, 3:]
+    values = (
+        (criteria.UNREACHABLE, float(result.unreachable.sum())),
+        (criteria.BEYOND_LIMITS, float(result.beyond_limits.sum())),
+        (criteria.IN_GROUND, float(len(result.in_ground))),
+        (criteria.PLAN_FORCE, 100 * _rms(plan_force) / mg),
+        (criteria.PLAN_TORQUE, 100 * _rms(plan_torque) / (mg * LEVER)),
+        (criteria.BODY_FORCE, _rms(result.body_residual[:, :3]) / mg),
+        (criteria.BODY_TORQUE, _rms(result.body_residual[:, 3:]) / (mg * LEVER)),
+        (criteria.PEAK_TORQUE, float(torque.max())),
+        (criteria.PEAK_SPEED, float(speed.max())),
+    )
+    metrics = [Metric(OPEN_LOOP, criterion, value) for criterion, value in values]
+    verdicts = {metric.criterion: metric.verdict for metric in metrics}
+
     incidents = []
-    force, torque = np.linalg.norm(result.plan_residual[:, :3], axis=1), np.linalg.norm(result.plan_residual[:, 3:], axis=1)
-    for metric, course, scale, what in (
-        (metrics[3], force, mg, "the planned forces do not explain the motion of the centre of mass"),
-        (metrics[4], torque, mg * LEVER, "the planned forces do not explain the rotation"),
+    for criterion, vectors, scale, what in (
+        (criteria.PLAN_FORCE, plan_force, mg, "the planned forces do not explain the motion of the center of mass"),
+        (criteria.PLAN_TORQUE, plan_torque, mg * LEVER, "the planned forces do not explain the rotation"),
     ):
-        if metric.verdict is not Verdict.PASS:
-            incidents.append(Incident(float(plan.t[np.argmax(100 * course / scale > metric.passes)]), f"open loop: {what}"))
-    for flags, what in (
+        if verdicts[criterion] is not Verdict.PASS:
+            beyond = 100 * np.linalg.norm(vectors, axis=1) / scale > criterion.passes
+            incidents.append(Incident(float(plan.t[np.argmax(beyond)]), f"{OPEN_LOOP}: {what}"))
+    by_foot = (
         (result.unreachable, "out of reach"),
         (result.beyond_limits, "a joint past its limit"),
-        ((share > 1).any(-1), "planned forces need more torque than a motor has"),
+        ((torque > 1).any(-1), "the planned forces need more torque than a motor has"),
         ((speed > 1).any(-1), "a joint faster than its limit"),
-    ):
-        at = _first(flags)
-        if at:
-            incidents.append(Incident(float(plan.t[at[0]]), f"open loop: {what}", plan.foot_names[at[1]]))
+    )
+    incidents += _first_by_foot(OPEN_LOOP, plan.t, plan.foot_names, by_foot)
     if result.in_ground:
         k, body = result.in_ground[0]
-        foot = next((f for f in plan.foot_names if body.startswith(f)), None)
-        incidents.append(Incident(float(plan.t[k]), f"open loop: {body} is in the ground", foot))
+        incidents.append(Incident(float(plan.t[k]), f"{OPEN_LOOP}: {body} is in the ground", foot_of(body, plan.foot_names)))
     return metrics, incidents
 
 
 @dataclass(frozen=True)
-class Filtered:
-    """Simulated against planned forces, both averaged over 20 ms, (K, E, 3) N."""
+class FilteredForces:
+    """Simulated and planned forces of the feet, averaged over `FORCE_WINDOW`, (K, E, 3) N."""
 
     simulated: Array
     planned: Array
 
+    @property
+    def difference(self) -> Array:
+        """(K, E, 3) N."""
+        return self.simulated - self.planned
 
-def filtered_forces(replay: Replay, reference: Reference) -> Filtered:
-    """Average both over 20 ms, so that an impact of two milliseconds does not hide the rest."""
-    K = len(replay.t)
-    width = max(1, round(0.02 / reference.t[1]))
-    return Filtered(
+    @property
+    def vertical_correlation(self) -> float:
+        """Correlation of the vertical forces; 1 if one of them is constant."""
+        both = np.stack([self.simulated[..., 2].ravel(), self.planned[..., 2].ravel()])
+        return float(np.asarray(np.corrcoef(both))[0, 1]) if both.std(1).min() > LEAST_SPREAD else 1.0
+
+
+def filtered_forces(replay: Replay, reference: Reference) -> FilteredForces:
+    """Average both over `FORCE_WINDOW`."""
+    width = max(1, round(FORCE_WINDOW / reference.t[1]))
+    planned = reference.force[: len(replay.t)]
+    return FilteredForces(
         uniform_filter1d(replay.force, width, axis=0, mode="nearest"),
-        uniform_filter1d(reference.force[:K], width, axis=0, mode="nearest"),
+        uniform_filter1d(planned, width, axis=0, mode="nearest"),
     )
 
 
-def _persistent(flags: Any, samples: int) -> Bools:
-    """True where flags (K, E) have been true for `samples` in a row."""
-    run = np.zeros(flags.shape, int)
-    for k in range(len(flags)):
-        run[k] = np.where(flags[k], (run[k - 1] if k else 0) + 1, 0)
-    result: Bools = run >= samples
-    return result
-
-
-def closed_loop(
-    plan: Plan, replay: Replay, reference: Reference, index: Indices, layer: str = "closed loop"
+def judge_closed_loop(
+    layer: str, plan: Plan, replay: Replay, reference: Reference, index: Indices
 ) -> tuple[list[Metric], list[Incident]]:
-    """Metrics of the simulation, and what went wrong in it."""
-    incidents = [i for i in (replay.fall, replay.first_stray) if i]
-    K = len(replay.t)
-    fell = 0.0 if replay.fall is None else 1.0
-    if K < 2:
-        return [Metric(layer, "fall", 1.0, "", 0, 0)], incidents
-    mg, period = plan.weight, float(reference.t[1])
-    com = np.linalg.norm(replay.com - reference.com[:K], axis=1)
+    """Metrics of a simulation, and what went wrong in it."""
+    K, mg = len(replay.t), plan.weight
+    if K < 2:  # nothing to measure
+        return [Metric(layer, criteria.FALL, 1.0)], _incidents_of(replay)
+    com = np.linalg.norm(replay.com - reference.com[:K], axis=1)  # m
     turn = np.degrees(np.linalg.norm(replay.rotation_error, axis=1))
     planned = reference.contact[:K]
-    contact = np.linalg.norm(replay.force, axis=2) > 3.0
-    forces = filtered_forces(replay, reference)
-    difference = forces.simulated - forces.planned
     stances = int(planned[0].sum() + (planned[1:] & ~planned[:-1]).sum())
-    saturated = np.abs(replay.torque) > 0.98 * index.torque_limit
-    both = np.stack([forces.simulated[..., 2].ravel(), forces.planned[..., 2].ravel()])
-    correlation = float(np.asarray(np.corrcoef(both))[0, 1]) if both.std(1).min() > 1.0 else 1.0
-    metrics = [
-        Metric(layer, "fall", fell, "", 0, 0),
-        Metric(layer, "contacts other than feet", float((replay.stray_contacts > 0).sum()), "samples", 0, 0),
-        Metric(layer, "controller without solution", 100.0 * replay.controller_failures / K, "% of steps", 0, 1),
-        Metric(layer, "centre of mass, rms", 1e3 * float(np.sqrt((com**2).mean())), "mm", 7, 40),
-        Metric(layer, "centre of mass, max", 1e3 * float(com.max()), "mm", 20, 100),
-        Metric(layer, "rotation, rms", float(np.sqrt((turn**2).mean())), "°", 1, 3),
-        Metric(layer, "rotation, max", float(turn.max()), "°", 3, 8),
-        Metric(layer, "feet, rms", 1e3 * _rms(replay.foot - reference.foot[:K]), "mm", 5, 25),
-        Metric(layer, "slip per step", 1e3 * float(replay.slip.sum()) / max(stances, 1), "mm", 3, 10),
-        Metric(layer, "contact mismatch", 100 * float((contact != planned).mean()), "% of samples", 1.5, 4),
-        Metric(layer, "torque at its limit", 100 * float(saturated.mean()), "% of samples", 0.5, 6),
-        Metric(layer, "foot forces, rms", float(np.sqrt(np.sum(difference**2, axis=(1, 2)).mean())) / mg, "m g", 0.08, 0.15),
-        Metric(layer, "net force, rms", _rms(np.sum(difference, axis=1)) / mg, "m g", 0.07, 0.15),
-        Metric(layer, "vertical force, correlation", correlation, "", 0.98, 0.95, at_least=True),
-    ]
-    patience = max(1, round(0.05 / period))
-    for flags, what in (
-        (_persistent(planned & ~contact, patience), "no contact for 50 ms where contact is planned"),
-        (_persistent(contact & ~planned, patience), "contact for 50 ms where a swing is planned"),
-        (_slipped(replay.slip, planned, 0.02), "slips by 20 mm in one stance"),
-        (_persistent(saturated.any(-1), patience), "a motor at its limit for 50 ms"),
-    ):
-        at = _first(flags)
-        if at:
-            incidents.append(Incident(float(replay.t[at[0]]), f"{layer}: {what}", index.feet[at[1]]))
+    forces = filtered_forces(replay, reference)
+    difference = forces.difference
+    saturated = np.abs(replay.torque) > SATURATED * index.torque_limit
+    values = (
+        (criteria.FALL, 0.0 if replay.fall is None else 1.0),
+        (criteria.STRAY_CONTACTS, float((replay.stray_contacts > 0).sum())),
+        (criteria.NO_SOLUTION, 100.0 * replay.controller_failures / K),
+        (criteria.COM_RMS, 1e3 * float(np.sqrt((com**2).mean()))),
+        (criteria.COM_MAX, 1e3 * float(com.max())),
+        (criteria.ROTATION_RMS, float(np.sqrt((turn**2).mean()))),
+        (criteria.ROTATION_MAX, float(turn.max())),
+        (criteria.FEET_RMS, 1e3 * _rms(replay.foot - reference.foot[:K])),
+        (criteria.SLIP, 1e3 * float(replay.slip.sum()) / max(stances, 1)),
+        (criteria.CONTACT_MISMATCH, 100 * float((replay.contact != planned).mean())),
+        (criteria.SATURATION, 100 * float(saturated.mean())),
+        (criteria.FOOT_FORCES, float(np.sqrt(np.sum(difference**2, axis=(1, 2)).mean())) / mg),
+        (criteria.NET_FORCE, _rms(np.sum(difference, axis=1)) / mg),
+        (criteria.FORCE_CORRELATION, forces.vertical_correlation),
+    )
+    metrics = [Metric(layer, criterion, value) for criterion, value in values]
     net = np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
-    for course, limit, what in (
-        (com, 0.1, "centre of mass 0.1 m off"),
-        (turn, 8.0, "the trunk is turned by 8° from the plan"),
-        (net, 0.15, "the feet's net force is off by 15 % of m g"),
-    ):
-        if course.max() > limit:
-            incidents.append(Incident(float(replay.t[np.argmax(course > limit)]), f"{layer}: {what}"))
+    incidents = _incidents_of(replay)
+    incidents += _incidents_by_foot(layer, replay, planned, saturated.any(-1), index)
+    incidents += _incidents_of_tracking(layer, replay.t, com, turn, net)
     return metrics, incidents
 
 
-def _slipped(slip: Array, planned: Bools, limit: float) -> Bools:
-    """Where a foot (K, E) has slipped by more than `limit` since its stance began."""
-    total = np.zeros(slip.shape)
-    for k in range(len(slip)):
-        total[k] = np.where(planned[k], (total[k - 1] if k else 0.0) + slip[k], 0.0)
-    result: Bools = total > limit
-    return result
+def _incidents_of(replay: Replay) -> list[Incident]:
+    """What the simulation itself recorded."""
+    return [incident for incident in (replay.fall, replay.first_stray) if incident]
+
+
+def _incidents_by_foot(layer: str, replay: Replay, planned: Bools, saturated: Any, index: Indices) -> list[Incident]:
+    """Wrong contacts, slip, and saturated motors; flags are (K, E)."""
+    samples = max(1, round(PATIENCE / float(replay.t[1])))
+    ones = np.ones(planned.shape)
+
+    def lasting(flags: Bools) -> Bools:
+        """True where flags have been true for `samples` in a row."""
+        result: Bools = since_start(flags, ones) >= samples
+        return result
+
+    time = f"for {1e3 * PATIENCE:g} ms"
+    found = (
+        (lasting(planned & ~replay.contact), f"no contact {time} where contact is planned"),
+        (lasting(replay.contact & ~planned), f"contact {time} where a swing is planned"),
+        (since_start(planned, replay.slip) > SLIP_INCIDENT, f"slips by {1e3 * SLIP_INCIDENT:g} mm in one stance"),
+        (lasting(saturated), f"a motor at its limit {time}"),
+    )
+    return _first_by_foot(layer, replay.t, index.feet, found)
+
+
+def _incidents_of_tracking(layer: str, t: Array, com: Array, turn: Array, net: Array) -> list[Incident]:
+    """Where errors of center of mass (K,) m, rotation (K,) degrees and net force (K,) m g first exceed a limit for marginal."""
+    com_limit, turn_limit = criteria.COM_MAX.marginal / 1e3, criteria.ROTATION_MAX.marginal
+    net_limit = criteria.NET_FORCE.marginal
+    incidents = []
+    for errors, limit, what in (
+        (com, com_limit, f"the center of mass is {com_limit:g} m from the plan"),
+        (turn, turn_limit, f"the trunk is turned by {turn_limit:g}° from the plan"),
+        (net, net_limit, f"the net force of the feet differs from the plan by {100 * net_limit:g} % of m g"),
+    ):
+        if errors.max() > limit:
+            incidents.append(Incident(float(t[np.argmax(errors > limit)]), f"{layer}: {what}"))
+    return incidents

@@ -1,31 +1,30 @@
-"""Full robot models: where they are found, and what the rest of the package reads off them.
+"""Full robot models: where they are found, and what the rest of the package reads from them.
 
-A model is one MJCF file, `robots/NAME.xml`, with a free joint `root`, a body `base`, and for every foot `F` the joints
-`F_HAA`, `F_HFE`, `F_KFE`, motors of the same names, a spherical geom `F` and a site `F` at its centre. A keyframe `stand`
-holds the nominal stance.
+A model is one MJCF file, `robots/NAME.xml`. It has a free joint `root`, a body `base`, and for each foot `F` the joints `F_HAA`, `F_HFE`
+and `F_KFE`, motors with the same names, a spherical geom `F`, and a site `F` at its center. Names of bodies of that leg begin with `F`. A
+keyframe `stand` holds the nominal stance.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import Array, Integers
 from .errors import InputError
+from .settings import MUJOCO_VERSION
 
-Array = npt.NDArray[np.float64]
-
-MUJOCO_VERSION = "3.17.0"
-JOINTS = ("HAA", "HFE", "KFE")
+JOINTS = ("HAA", "HFE", "KFE")  # of a leg, from the hip down: hip abduction, hip flexion, knee flexion
 
 
 def check_mujoco() -> None:
-    """Refuse a MuJoCo other than the one that the thresholds were measured with."""
+    """Refuse a version of MuJoCo other than the one that the criteria were calibrated with."""
     if mujoco.__version__ != MUJOCO_VERSION:
         raise InputError(
             f"MuJoCo {mujoco.__version__} is installed; the replay is calibrated with {MUJOCO_VERSION}. "
@@ -47,7 +46,7 @@ def available_models() -> list[str]:
 
 
 def find_model(name: str) -> Path:
-    """The MJCF file of robot `name`, or of the path `name` if it ends in .xml."""
+    """The MJCF file of robot `name`, or the file `name` itself if it ends in .xml."""
     if name.endswith(".xml"):
         if not Path(name).is_file():
             raise InputError(f"{name}: there is no such model file")
@@ -58,7 +57,7 @@ def find_model(name: str) -> Path:
             return path
     known = ", ".join(available_models()) or "none (set WARPGAIT_ROBOTS to the folder that holds them)"
     raise InputError(
-        f'robot "{name}" has no full model (robots/{name}.xml). Models at hand: {known}. '
+        f'robot "{name}" has no full model (robots/{name}.xml). Available models: {known}. '
         "Plan for one of these, or name a model to replay on with --model (its mass and legs will differ from the plan's)."
     )
 
@@ -69,26 +68,39 @@ class Composite:
 
     mass: float  # kg
     center_of_mass: Array  # (3,) m, from the base origin, base frame
-    inertia: Array  # (3, 3) kg m², about the centre of mass, base frame
+    inertia: Array  # (3, 3) kg m², about the center of mass, base frame
 
 
 @dataclass(frozen=True)
 class Indices:
-    """Where things are in MuJoCo's arrays; feet in the order given."""
+    """Where things are in MuJoCo's arrays. E feet, in the order of `feet`."""
 
     feet: tuple[str, ...]
-    qpos: npt.NDArray[np.intp]  # (E, 3) joint positions
-    qvel: npt.NDArray[np.intp]  # (E, 3) joint velocities
-    actuator: npt.NDArray[np.intp]  # (E, 3) motors
+    qpos: Integers  # (E, 3) joint positions
+    qvel: Integers  # (E, 3) joint velocities
+    actuator: Integers  # (E, 3) motors
     geom: list[int]  # (E,) foot spheres
-    site: list[int]  # (E,) foot centres
+    site: list[int]  # (E,) foot centers
     body: list[int]  # (E,) bodies that carry them
     base: int  # base body
     radius: float  # m, of the feet
     torque_limit: Array  # (E, 3) N m
     speed_limit: float  # rad/s
-    lower: Array  # (E, 3) rad
-    upper: Array  # (E, 3) rad
+
+    @property
+    def joint_names(self) -> list[str]:
+        """The 3E joints, leg by leg."""
+        return [f"{foot}_{joint}" for foot in self.feet for joint in JOINTS]
+
+
+def foot_of(body: str, feet: Iterable[str]) -> str | None:
+    """The foot whose leg `body` is part of, if any."""
+    return next((foot for foot in feet if body.startswith(foot)), None)
+
+
+def adhesion_name(foot: str) -> str:
+    """The name of the actuator that makes a foot stick."""
+    return f"adhesion_{foot}"
 
 
 def load_spec(path: Path) -> Any:
@@ -105,7 +117,7 @@ def foot_names(model: Any) -> tuple[str, ...]:
 
 
 def indices(model: Any, feet: tuple[str, ...]) -> Indices:
-    """Look up the parts of `feet`, or say which one is missing."""
+    """Look up the parts of `feet`, or name the missing one."""
     try:
         joints = [[model.joint(f"{foot}_{j}") for j in JOINTS] for foot in feet]
         motors = [[model.actuator(f"{foot}_{j}") for j in JOINTS] for foot in feet]
@@ -122,15 +134,13 @@ def indices(model: Any, feet: tuple[str, ...]) -> Indices:
             radius=float(model.geom_size[geoms[0], 0]),
             torque_limit=np.array([[m.ctrlrange[1] for m in leg] for leg in motors]),
             speed_limit=float(model.numeric("joint_speed_limit").data[0]),
-            lower=np.array([[j.range[0] for j in leg] for leg in joints]),
-            upper=np.array([[j.range[1] for j in leg] for leg in joints]),
         )
     except KeyError as error:
         raise InputError(f"the robot model lacks a part that the replay needs (feet {', '.join(feet)}): {error}") from error
 
 
 def composite(model: Any, data: Any) -> Composite:
-    """Mass, centre of mass and inertia of the posture in `data` (positions up to date)."""
+    """Mass, center of mass and inertia of the posture in `data`, whose positions must be up to date."""
     base = model.body("base").id
     rotation = data.xmat[base].reshape(3, 3)
     mass = model.body_mass.sum()

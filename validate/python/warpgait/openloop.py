@@ -1,4 +1,4 @@
-"""Open loop: can the full robot take the plan's postures, and do the planned forces move it as planned? No simulation."""
+"""Open loop, no simulation: can the full robot take the plan's postures, and do the planned forces produce the planned motion?"""
 
 from __future__ import annotations
 
@@ -9,10 +9,17 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .arrays import Array, Bools
+from .geometry import rotation_from_wxyz, rotations_between
 from .kinematics import legs
-from .model import Indices
-from .plan import Array, Bools, Plan
-from .rolling import Rolling, none, roll
+from .model import Indices, stand
+from .plan import Plan
+from .rolling import Rolling, no_rolling, roll
+
+POSTURE_ITERATIONS = (
+    3  # for the base's origin: each moves it an eighth as far as the one before; a fourth would move it by 0.2 mm
+)
+TOUCH_DEPTH = 1e-3  # m: a part that is less deep in the ground only touches it
 
 
 @dataclass(frozen=True)
@@ -23,9 +30,9 @@ class OpenLoop:
     qvel: Array  # (N, nv)
     rolling: Rolling  # of the feet in these postures
     unreachable: Bools  # (N, E) no joint angles put the foot there
-    beyond_limits: Bools  # (N, E) only with a joint past its limit
-    in_ground: list[tuple[int, str]]  # sample and body of every posture with a part other than a foot in the ground
-    plan_residual: Array  # (N, 6) force N and torque about the centre of mass N m that the centroidal plan leaves unexplained
+    beyond_limits: Bools  # (N, E) reached only with a joint past its limit
+    in_ground: list[tuple[int, str]]  # sample and body of every posture that has a part other than a foot in the ground
+    plan_residual: Array  # (N, 6) force N, and torque about the center of mass N m, that the plan's forces leave unexplained
     body_residual: Array  # (N, 6) the same for the full body
     torque: Array  # (N, E, 3) N m
 
@@ -40,24 +47,29 @@ class Postures:
     shank: Array  # (N, E, 3, 3) orientations of the bodies that carry the feet, body to world
 
 
-def postures(plan: Plan, model: Any, index: Indices, rolling: Rolling) -> Postures:
-    """Joint positions that put centre of mass, trunk orientation and feet where the plan has them; what cannot be reached.
+def com_from_base(data: Any, index: Indices) -> Array:
+    """From the base's origin to the center of mass (3,), world frame."""
+    offset: Array = data.subtree_com[index.base] - data.xpos[index.base]
+    return offset
 
-    The base's origin lies off the centre of mass by an amount that depends on the legs: three fixed-point steps find it.
+
+def postures(plan: Plan, model: Any, index: Indices, rolling: Rolling) -> Postures:
+    """Joint positions that put the center of mass, the trunk's orientation and the feet where the plan has them.
+
+    The offset of the center of mass from the base's origin depends on the legs. It is found by fixed-point iteration.
     """
     data = mujoco.MjData(model)
     N, E = plan.foot_contact.shape
-    R = Rotation.from_quat(plan.base_quaternion_wxyz[:, [1, 2, 3, 0]]).as_matrix()
+    R = rotation_from_wxyz(plan.base_quaternion_wxyz).as_matrix()
     centers = plan.foot_position + index.radius * plan.center_direction + rolling.offset
     qpos = np.zeros((N, model.nq))
     qpos[:, 3:7] = plan.base_quaternion_wxyz
     unreachable, beyond = np.zeros((N, E), bool), np.zeros((N, E), bool)
     shank = np.zeros((N, E, 3, 3))
-    mujoco.mj_resetDataKeyframe(model, data, model.key("stand").id)
-    mujoco.mj_forward(model, data)
-    offset = np.tile(data.subtree_com[index.base] - data.xpos[index.base], (N, 1))
+    stand(model, data)
+    offset = np.tile(com_from_base(data, index), (N, 1))  # base frame
     chain = legs(model, index.feet)
-    for _ in range(3):
+    for _ in range(POSTURE_ITERATIONS):
         qpos[:, :3] = plan.base_position - np.einsum("nij,nj->ni", R, offset)
         local = np.einsum("nji,nej->nei", R, centers - qpos[:, None, :3])
         for e, leg in enumerate(chain):
@@ -68,16 +80,16 @@ def postures(plan: Plan, model: Any, index: Indices, rolling: Rolling) -> Postur
             data.qpos[:] = qpos[k]
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
-            offset[k] = R[k].T @ (data.subtree_com[index.base] - data.xpos[index.base])
+            offset[k] = R[k].T @ com_from_base(data, index)
             shank[k] = data.xmat[index.body].reshape(E, 3, 3)
     return Postures(qpos, unreachable, beyond, shank)
 
 
 def centroidal_residual(plan: Plan) -> Array:
-    """What the plan's own motion and forces leave of Newton's and Euler's laws, (N, 6); ends left at zero.
+    """What the plan's own motion and forces leave of the laws of Newton and Euler, (N, 6); the first and last samples are zero.
 
-    Σf + m g = m p̈ and Σ(pᵢ − p) × fᵢ = d/dt (R I Rᵀ ω), with p̈ and ω from differences of the sampled *poses*, so that neither
-    stored derivatives nor forces on feet in the air can flatter the plan.
+    Σf + m g = m p̈ and Σ(pᵢ − p) × fᵢ = d/dt (R I Rᵀ ω). p̈ and ω are differences of the sampled *poses*, and forces on feet in the
+    air are left out, so the stored derivatives cannot hide an error.
     """
     step = plan.t[1]
     force = plan.foot_force * plan.foot_contact[..., None]
@@ -85,8 +97,8 @@ def centroidal_residual(plan: Plan) -> Array:
     p = plan.base_position
     acceleration = (p[2:] - 2 * p[1:-1] + p[:-2]) / step**2
     residual[1:-1, :3] = force.sum(1)[1:-1] + plan.robot.mass * (plan.robot.gravity - acceleration)
-    rotation = Rotation.from_quat(plan.base_quaternion_wxyz[:, [1, 2, 3, 0]])
-    turn = (rotation[1:] * rotation[:-1].inv()).as_rotvec()
+    rotation = rotation_from_wxyz(plan.base_quaternion_wxyz)
+    turn = rotations_between(rotation)
     middle = (Rotation.from_rotvec(turn / 2) * rotation[:-1]).as_matrix()
     momentum = np.einsum("nij,jk,nlk,nl->ni", middle, plan.robot.inertia, middle, turn / step)
     torque = np.cross(plan.foot_position - p[:, None], force).sum(1)
@@ -95,7 +107,7 @@ def centroidal_residual(plan: Plan) -> Array:
 
 
 def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, str]]:
-    """Which postures (N, nq) put a part other than a foot into the ground of `world` by more than a millimetre: (sample, body)."""
+    """Postures (N, nq) that put a part other than a foot deeper than `TOUCH_DEPTH` into the ground of `world`: (sample, body)."""
     data = mujoco.MjData(world)
     ground, feet = world.geom("ground").id, set(index.geom)
     found = []
@@ -106,50 +118,64 @@ def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, 
         for contact in range(data.ncon):
             pair = data.contact.geom[contact]
             other = int(pair[1] if pair[0] == ground else pair[0])
-            if other not in feet and data.contact.dist[contact] < -1e-3:
+            if other not in feet and data.contact.dist[contact] < -TOUCH_DEPTH:
                 found.append((k, world.body(world.geom_bodyid[other]).name))
                 break
     return found
 
 
-def analyse(plan: Plan, model: Any, world: Any, index: Indices) -> OpenLoop:
-    """Inverse kinematics and inverse dynamics along the plan, of `model` (contacts are switched off), and its way over the ground of `world`."""
-    found = postures(plan, model, index, none(plan))
-    rolling = roll(plan, found.shank, index.radius)
-    found = postures(plan, model, index, rolling)
-    qpos = found.qpos
-    data = mujoco.MjData(model)
+def joint_motion(plan: Plan, model: Any, qpos: Array) -> tuple[Array, Array]:
+    """Velocities and accelerations (N, nv) by central differences of positions (N, nq); zero at the ends, where there are none."""
     N, step = len(plan.t), plan.t[1]
     qvel, qacc = np.zeros((N, model.nv)), np.zeros((N, model.nv))
     for k in range(1, N - 1):
         mujoco.mj_differentiatePos(model, qvel[k], 2 * step, qpos[k - 1], qpos[k + 1])
     qacc[2:-2] = (qvel[3:-1] - qvel[1:-3]) / (2 * step)
+    return qvel, qacc
 
+
+def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: Array, qacc: Array) -> tuple[Array, Array]:
+    """Wrench (N, 6) about the center of mass that the planned forces leave unexplained, and joint torques (N, E, 3).
+
+    Contacts and joint limits of `model` are switched off meanwhile. The two samples at each end, whose accelerations are unknown, are zero.
+    """
+    data = mujoco.MjData(model)
+    N = len(plan.t)
+    residual, torque = np.zeros((N, 6)), np.zeros((N, len(index.feet), 3))
+    jacobian = np.zeros((3, model.nv))
     flags = model.opt.disableflags
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
-    residual, torque = np.zeros((N, 6)), np.zeros((N, len(index.feet), 3))
-    J = np.zeros((3, model.nv))
     for k in range(2, N - 2):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[k], qvel[k], qacc[k]
         mujoco.mj_inverse(model, data)
         generalized = data.qfrc_inverse.copy()
         for e in np.flatnonzero(plan.foot_contact[k]):
-            mujoco.mj_jac(model, data, J, None, plan.foot_position[k, e], index.body[e])
-            generalized -= J.T @ plan.foot_force[k, e]
-        # The free joint's rows are a world force and a body-frame torque about the base's origin; moved to the centre of mass.
+            mujoco.mj_jac(model, data, jacobian, None, plan.foot_position[k, e], index.body[e])
+            generalized -= jacobian.T @ plan.foot_force[k, e]
+        # The free joint's rows are a force in the world frame and a torque about the base's origin in the base frame.
         force = generalized[:3]
-        arm = data.subtree_com[index.base] - data.xpos[index.base]
+        arm = com_from_base(data, index)
         moment = data.xmat[index.base].reshape(3, 3) @ generalized[3:6] - np.cross(arm, force)
         residual[k] = np.r_[force, moment]
         torque[k] = generalized[index.qvel]
     model.opt.disableflags = flags
+    return residual, torque
+
+
+def analyze(plan: Plan, model: Any, world: Any, index: Indices) -> OpenLoop:
+    """Inverse kinematics and inverse dynamics of `model` along the plan, and which parts would be in the ground of `world`."""
+    shank = postures(plan, model, index, no_rolling(plan)).shank
+    rolling = roll(plan, shank, index.radius)
+    found = postures(plan, model, index, rolling)
+    qvel, qacc = joint_motion(plan, model, found.qpos)
+    residual, torque = inverse_dynamics(plan, model, index, found.qpos, qvel, qacc)
     return OpenLoop(
-        qpos=qpos,
+        qpos=found.qpos,
         qvel=qvel,
         rolling=rolling,
         unreachable=found.unreachable,
         beyond_limits=found.beyond_limits,
-        in_ground=parts_in_ground(world, index, qpos),
+        in_ground=parts_in_ground(world, index, found.qpos),
         plan_residual=centroidal_residual(plan),
         body_residual=residual,
         torque=torque,

@@ -1,4 +1,4 @@
-"""`P.report.html`: the report for people, one file without outside references."""
+"""`P.report.html`: the report for people, one self-contained file."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .metrics import Metric, filtered_forces
-from .report import write_safely
+from . import criteria
+from .criteria import Criterion, Metric
+from .files import write_text
+from .metrics import FORCE_WINDOW, filtered_forces
+from .model import JOINTS
 from .svg import Line, chart, contact_bars
 from .validation import Trial, Validation
 
@@ -31,102 +34,117 @@ polyline.foot0{stroke:var(--foot0)}polyline.foot1{stroke:var(--foot1)}polyline.f
 """
 
 
+_COLORS = 4  # of feet in the style sheet
+
+_SENTENCES = {
+    "pass": "The robot tracks this plan.",
+    "marginal": "The robot tracks this plan, barely.",
+    "fail": "The robot does not track this plan.",
+}
+
+
+def _title(name: str) -> str:
+    """A name with a capital letter, as HTML."""
+    return escape(name[0].upper() + name[1:])
+
+
 def _table(metrics: list[Metric]) -> str:
     rows = []
     for m in metrics:
-        sign = "≥" if m.at_least else "≤"
+        c, word = m.criterion, m.verdict.word
         rows.append(
-            f'<tr><td>{escape(m.name)}</td><td class="n">{m.value:.4g}</td><td class="unit">{escape(m.unit)}</td>'
-            f'<td class="n">{sign} {m.passes:g}</td><td class="n">{sign} {m.marginal:g}</td><td class="{m.verdict.word}">{m.verdict.word}</td></tr>'
+            f'<tr><td>{escape(c.name)}</td><td class="n">{m.value:.4g}</td><td class="unit">{escape(c.unit)}</td>'
+            f'<td class="n">{c.sign} {c.passes:g}</td><td class="n">{c.sign} {c.marginal:g}</td><td class="{word}">{word}</td></tr>'
         )
     head = '<tr><th></th><th class="n">value</th><th></th><th class="n">pass</th><th class="n">marginal</th><th></th></tr>'
     return f'<div class="scroll"><table>{head}{"".join(rows)}</table></div>'
 
 
+def _limits(criterion: Criterion) -> tuple[float, float]:
+    return criterion.passes, criterion.marginal
+
+
 def _plots(v: Validation, trial: Trial) -> list[str]:
-    r, ref = trial.replay, trial.reference
-    K, t, end = len(trial.replay.t), trial.replay.t, v.plan.duration
+    """Charts of a trial over time."""
+    r, ref, t, end = trial.replay, trial.reference, trial.replay.t, v.plan.duration
+    K, feet = len(t), list(enumerate(v.index.feet))
     if K < 2:
         return ["<p>The replay ended before there was anything to plot.</p>"]
-    contact = np.linalg.norm(r.force, axis=2) > 3.0
-    forces = filtered_forces(r, ref)
-    error = 1e3 * (r.com - ref.com[:K])
-    parts = [contact_bars(v.index.feet, t, ref.contact[:K], contact, end)]
-    limits = {m.name: (m.passes, m.marginal) for m in trial.metrics}
-
-    def distance(title: str, unit: str, lines: list[Line], metric: str) -> str:
-        return chart(title, unit, lines, limits.get(metric, ()), end)
-
-    off = [Line(t, np.linalg.norm(error, axis=1), "actual")]
-    parts.append(distance("Centre of mass: distance from plan", "mm", off, "centre of mass, max"))
+    com = [Line(t, np.linalg.norm(1e3 * (r.com - ref.com[:K]), axis=1), "actual")]
     turn = [Line(t, np.degrees(np.linalg.norm(r.rotation_error, axis=1)), "actual")]
-    parts.append(distance("Trunk orientation: angle from plan", "°", turn, "rotation, max"))
     apart = 1e3 * np.linalg.norm(r.foot - ref.foot[:K], axis=2)
-    feet = [Line(t, apart[:, e], f"foot{e % 4}", foot) for e, foot in enumerate(v.index.feet)]
-    parts.append(chart("Feet: distance from plan", "mm", feet, (), end))
-    total = [
-        Line(t, forces.planned[..., 2].sum(1), "planned", "planned"),
-        Line(t, forces.simulated[..., 2].sum(1), "actual", "replayed"),
+    distances = [Line(t, apart[:, e], f"foot{e % _COLORS}", foot) for e, foot in feet]
+    parts = [
+        contact_bars(v.index.feet, t, ref.contact[:K], r.contact, end),
+        chart("Center of mass: distance from plan", "mm", com, _limits(criteria.COM_MAX), end),
+        chart("Trunk orientation: angle from plan", "°", turn, _limits(criteria.ROTATION_MAX), end),
+        chart("Feet: distance from plan", "mm", distances, (), end),
     ]
-    parts.append(chart("Vertical force, all feet, 20 ms mean", "N", total, (), end))
-    for e, foot in enumerate(v.index.feet):
-        lines = [Line(t, forces.planned[:, e, 2], "planned", "planned"), Line(t, forces.simulated[:, e, 2], "actual", "replayed")]
+    forces = filtered_forces(r, ref)
+    planned, simulated = forces.planned[..., 2], forces.simulated[..., 2]
+    total = [Line(t, planned.sum(1), "planned", "planned"), Line(t, simulated.sum(1), "actual", "replayed")]
+    parts.append(chart(f"Vertical force, all feet, {1e3 * FORCE_WINDOW:g} ms mean", "N", total, (), end))
+    for e, foot in feet:
+        lines = [Line(t, planned[:, e], "planned", "planned"), Line(t, simulated[:, e], "actual", "replayed")]
         parts.append(chart(f"Vertical force, {foot}", "N", lines, (), end))
-    for j, joint in enumerate(("HAA", "HFE", "KFE")):
+    known = slice(2, -2)  # the open loop has no accelerations at the ends
+    for j, joint in enumerate(JOINTS):
         limit = float(v.index.torque_limit[:, j].max())
-        lines = [Line(v.plan.t[2:-2], v.analysis.torque[2:-2, e, j], f"foot{e % 4} faint") for e in range(len(v.index.feet))]
-        lines += [Line(t, r.torque[:, e, j], f"foot{e % 4}", foot) for e, foot in enumerate(v.index.feet)]
+        lines = [Line(v.plan.t[known], v.analysis.torque[known, e, j], f"foot{e % _COLORS} faint") for e, _ in feet]
+        lines += [Line(t, r.torque[:, e, j], f"foot{e % _COLORS}", foot) for e, foot in feet]
         parts.append(chart(f"Torque {joint} (faint: open loop)", "N m", lines, (-limit, limit), end))
     return parts
 
 
-def render(v: Validation, pictures: list[tuple[float, bytes]], picture_note: str | None) -> str:
-    """The page; `pictures` are (time s, PNG bytes)."""
-    word = v.verdict.word
-    sentence = {
-        "pass": "The robot tracks this plan.",
-        "marginal": "The robot tracks this plan, barely.",
-        "fail": "The robot does not track this plan.",
-    }[word]
+def _head(v: Validation) -> list[str]:
+    """Title, verdict, first failure and notes."""
+    word, name = v.verdict.word, escape(v.plan.path.name)
     parts = [
         f'<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>{escape(v.plan.path.name)}: {word}</title><style>{_STYLE}</style>",
-        f'<h1>{escape(v.plan.path.name)}</h1><p class="verdict {word}">{word}. {sentence}</p>',
+        f"<title>{name}: {word}</title><style>{_STYLE}</style>",
+        f'<h1>{name}</h1><p class="verdict {word}">{word}. {_SENTENCES[word]}</p>',
         f'<p class="soft">{escape(v.model_path.stem)}, {v.plan.duration:g} s, friction {v.plan.robot.friction:g}, '
         f"whole-body controller at {v.settings.rate:g} Hz; computed in {v.seconds:.1f} s.</p>",
     ]
-    first = v.first_failure
-    if first:
-        foot = f", {first.foot}" if first.foot else ""
-        parts.append(f"<p><strong>First failure</strong> at {first.time:.2f} s{escape(foot)}: {escape(first.what)}.</p>")
-    parts += [f"<p>{escape(note)}</p>" for note in v.notes]
+    if v.first_failure:
+        parts.append(f"<p><strong>First failure</strong> at {escape(str(v.first_failure))}.</p>")
+    return parts + [f"<p>{escape(note)}</p>" for note in v.notes]
+
+
+def _film(pictures: list[tuple[float, bytes]]) -> str:
+    """The pictures, inside the page."""
+    images = "".join(
+        f'<figure><img alt="at {t:.1f} s" src="data:image/png;base64,{base64.b64encode(png).decode()}"><figcaption class="unit">{t:.1f} s</figcaption></figure>'
+        for t, png in pictures
+    )
+    return f'<div class="film">{images}</div>'
+
+
+def _trial(trial: Trial) -> list[str]:
+    """Verdict, metrics and incidents of a trial."""
+    title, word = _title(trial.name) + ("" if trial.counts else " (does not count toward the verdict)"), trial.verdict.word
+    parts = [f'<h2>{title}: <span class="{word}">{word}</span></h2>{_table(trial.metrics)}']
+    if trial.incidents:
+        items = "".join(f"<li>{escape(str(i))}</li>" for i in sorted(trial.incidents, key=lambda i: i.time))
+        parts.append(f"<ul>{items}</ul>")
+    return parts
+
+
+def as_html(v: Validation, pictures: list[tuple[float, bytes]], picture_note: str | None) -> str:
+    """The page; `pictures` are (time s, PNG bytes)."""
+    parts = _head(v)
     if pictures:
-        images = "".join(
-            f'<figure><img alt="at {t:.1f} s" src="data:image/png;base64,{base64.b64encode(png).decode()}"><figcaption class="unit">{t:.1f} s</figcaption></figure>'
-            for t, png in pictures
-        )
-        parts.append(f'<div class="film">{images}</div>')
+        parts.append(_film(pictures))
     if picture_note:
         parts.append(f'<p class="soft">{escape(picture_note)}</p>')
     parts.append(f"<h2>Open loop: postures, torques, the plan's own laws</h2>{_table(v.metrics)}")
     for trial in v.trials:
-        title = trial.name[0].upper() + trial.name[1:] + ("" if trial.counts else " (does not count towards the verdict)")
-        parts.append(
-            f'<h2>{escape(title)}: <span class="{trial.verdict.word}">{trial.verdict.word}</span></h2>{_table(trial.metrics)}'
-        )
-        if trial.incidents:
-            items = "".join(
-                f"<li>{i.time:.2f} s{', ' + escape(i.foot) if i.foot else ''}: {escape(i.what)}</li>"
-                for i in sorted(trial.incidents, key=lambda i: i.time)
-            )
-            parts.append(f"<ul>{items}</ul>")
-    name = v.shown.name[0].upper() + v.shown.name[1:]
-    parts.append(f"<h2>{escape(name)}, over time in s</h2>")
+        parts += _trial(trial)
+    parts.append(f"<h2>{_title(v.shown.name)}, over time in s</h2>")
     parts += _plots(v, v.shown)
     return "\n".join(parts) + "</html>\n"
 
 
 def write_html(v: Validation, target: Path, pictures: list[tuple[float, bytes]], picture_note: str | None) -> None:
     """Write the page."""
-    text = render(v, pictures, picture_note)
-    write_safely(target, lambda file: file.write(text.encode()))
+    write_text(target, as_html(v, pictures, picture_note))

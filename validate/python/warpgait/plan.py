@@ -1,4 +1,4 @@
-"""Plan files, schema 1: one NumPy archive `NAME.plan.npz` that is complete in itself.
+"""Plan files, schema 1: one self-contained NumPy archive `NAME.plan.npz`.
 
 World frame: x forward, y left, z up. SI units. N samples, E feet. Quaternions are scalar-first.
 """
@@ -6,25 +6,27 @@ World frame: x forward, y left, z up. SI units. N samples, E feet. Quaternions a
 from __future__ import annotations
 
 import json
-import tomllib
 import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import Array, Bools, runs
 from .errors import InputError
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from .geometry import smootherstep
 
 SCHEMA = 1
+
+# Tolerances of a reader; a writer keeps double precision.
+_UNIFORM = 1e-6  # s, between the steps of `t`
+_START = 1e-9  # s, of the first time
+_UNIT = 1e-6  # of the length of a unit vector or quaternion
 
 # Shape of every member that a replay needs: N samples, E feet, R rows along y, C columns along x.
 _FLOATS: dict[str, tuple[str | int, ...]] = {
@@ -65,11 +67,11 @@ class Heightfield:
 
 @dataclass(frozen=True)
 class PlannedRobot:
-    """The rigid body that was planned for."""
+    """The rigid body of the plan."""
 
     name: str
     mass: float  # kg
-    inertia: Array  # (3, 3) about the centre of mass, base frame, kg m²
+    inertia: Array  # (3, 3) about the center of mass, base frame, kg m²
     friction: float
     gravity: Array  # (3,) m/s²
 
@@ -80,7 +82,7 @@ class Plan:
 
     path: Path
     t: Array  # (N,) s, uniform from 0
-    base_position: Array  # (N, 3) centre of mass
+    base_position: Array  # (N, 3) center of mass
     base_quaternion_wxyz: Array  # (N, 4) body to world
     base_linear_velocity: Array  # (N, 3)
     base_linear_acceleration: Array  # (N, 3)
@@ -95,8 +97,9 @@ class Plan:
     foot_names: tuple[str, ...]  # E
     foot_adhesive: Bools  # (E,)
     terrain: Heightfield
-    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster or mesh
+    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster
     robot: PlannedRobot
+    pull_limit: float  # largest pull of an adhesive foot, fraction of m g; 0 if no foot is adhesive
     solved: bool  # every constraint of the NLP holds
     meta: Mapping[str, Any] = field(repr=False)
 
@@ -107,20 +110,20 @@ class Plan:
 
     @cached_property
     def center_direction(self) -> Array:
-        """(N, E, 3) unit vectors from the contact points to the feet's centres.
+        """(N, E, 3) unit vectors from the contact points to the feet's centers.
 
-        In stance the terrain's normal. In the air the terrain below means nothing to a foot: the direction turns smoothly from the normal at
-        lift-off to that at touch-down, or else every stone that is passed would shake the foot.
+        In stance this is the terrain's normal. In a swing it turns smoothly from the normal at lift-off to that at touch-down; the normal of
+        the terrain below would shake the foot at every stone that it passes.
         """
         direction = self.foot_normal.copy()
         for e in range(direction.shape[1]):
-            stance = np.flatnonzero(self.foot_contact[:, e])
-            for before, after in pairwise(stance):
-                s = np.arange(1, after - before)[:, None] / (after - before)
-                share = s**3 * (10 - 15 * s + 6 * s * s)
-                ends = self.foot_normal[before, e], self.foot_normal[after, e]
-                between = (1 - share) * ends[0] + share * ends[1]
-                direction[before + 1 : after, e] = between / np.linalg.norm(between, axis=-1, keepdims=True)
+            for first, end in runs(~self.foot_contact[:, e]):
+                if first == 0 or end == len(direction):
+                    continue  # a swing without a stance on both sides
+                before, after = first - 1, end
+                fraction = smootherstep(np.arange(1, after - before)[:, None] / (after - before))
+                between = (1 - fraction) * self.foot_normal[before, e] + fraction * self.foot_normal[after, e]
+                direction[first:end, e] = between / np.linalg.norm(between, axis=-1, keepdims=True)
         return direction
 
     @property
@@ -128,21 +131,12 @@ class Plan:
         """m g of the planned robot, N."""
         return self.robot.mass * float(np.linalg.norm(self.robot.gravity))
 
-    @property
-    def pull_limit(self) -> float:
-        """Largest pull of an adhesive foot, share of m g: the scenario's `motion.pull_limit`, or its default."""
-        try:
-            scenario = tomllib.loads(str(self.meta.get("scenario", "")))
-            return float(scenario.get("motion", {}).get("pull_limit", 1.2))
-        except (tomllib.TOMLDecodeError, AttributeError, TypeError, ValueError):
-            return 1.2
 
-
-_NPZ, _NPY = b"PK\x03\x04", b"\x93NUM"  # how archives and single arrays begin
+_NPZ, _NPY = b"PK\x03\x04", b"\x93NUM"  # first bytes of archives and of single arrays
 
 
 def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """All arrays of the archive in memory, or a refusal that names the damaged member."""
+    """All arrays of the archive; raises `InputError` with the name of a damaged member."""
     if path.is_dir():
         raise InputError(f"{path}: a folder, not a plan (NAME.plan.npz)")
     if not path.is_file():
@@ -165,14 +159,14 @@ def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise
     except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:
         if not zipfile.is_zipfile(path):
-            raise InputError(f"{path}: damaged: cut short, or not a whole .npz archive") from error
+            raise InputError(f"{path}: damaged: truncated, or not an .npz archive") from error
         where = f"member {member}: " if member else ""
         raise InputError(f"{path}: {where}not readable as a plan (damaged or not an .npz archive): {error}") from error
     return arrays
 
 
 class _Checker:
-    """Reads members of one archive against the table of shapes."""
+    """Reads the members of one archive and checks their shapes and types."""
 
     def __init__(self, path: Path, arrays: dict[str, npt.NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
@@ -225,16 +219,16 @@ class _Checker:
             raise self.fail("meta", "is not a JSON object")
         schema = meta.get("schema")
         if not isinstance(schema, int) or schema < 1:
-            raise self.fail("meta", f"has no usable key schema (found {schema!r})")
+            raise self.fail("meta", f"schema must be a positive whole number (found {schema!r})")
         if schema > SCHEMA:
-            raise self.fail("meta", f"is of schema {schema}; this version reads up to {SCHEMA}: update warpgait")
+            raise self.fail("meta", f"has schema {schema}; this version reads schemas up to {SCHEMA}: update warpgait")
         return meta
 
 
 def _robot(check: _Checker, meta: dict[str, Any]) -> PlannedRobot:
     robot = meta.get("robot")
     if not isinstance(robot, dict):
-        raise check.fail("meta", "has no object robot")
+        raise check.fail("meta", "has no object `robot`")
     try:
         result = PlannedRobot(
             name=str(robot["name"]),
@@ -251,12 +245,28 @@ def _robot(check: _Checker, meta: dict[str, Any]) -> PlannedRobot:
     if result.inertia.shape != (3, 3) or result.gravity.shape != (3,) or not np.isfinite(numbers).all():
         raise check.fail("meta", "robot: inertia must be 3x3 and gravity a vector of 3, all finite")
     if result.mass <= 0 or result.friction <= 0 or not result.gravity.any():
-        raise check.fail("meta", "robot: mass, friction and gravity must not vanish")
+        raise check.fail("meta", "robot: mass and friction must be positive, and gravity must not be zero")
     return result
 
 
-def load(path: str | Path) -> Plan:
-    """Read a plan; raises `InputError` with file, member and reason if it cannot be used."""
+def _pull_limit(check: _Checker, meta: dict[str, Any], adhesive: Bools) -> float:
+    """`limits.pull_limit`, which a plan without adhesive feet does not need."""
+    if not adhesive.any():
+        return 0.0
+    limits = meta.get("limits")
+    if not isinstance(limits, dict) or "pull_limit" not in limits:
+        what = (
+            "has no limits.pull_limit, the largest pull of the adhesive feet: an older warpgait wrote this plan; solve it again"
+        )
+        raise check.fail("meta", what)
+    limit = limits["pull_limit"]
+    if not isinstance(limit, int | float) or not np.isfinite(limit) or limit < 0:
+        raise check.fail("meta", f"limits.pull_limit must be a fraction of m g, zero or more (found {limit!r})")
+    return float(limit)
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a plan file; raises `InputError` with file, member and reason if it cannot be used."""
     path = Path(path)
     check = _Checker(path, _members(path))
     meta = check.meta()
@@ -268,11 +278,11 @@ def load(path: str | Path) -> Plan:
     values |= {m: check.bools(m, s) for m, s in _BOOLS.items()}
 
     t = values["t"]
-    if len(t) < 3 or abs(t[0]) > 1e-9 or np.ptp(np.diff(t)) > 1e-6 or t[-1] <= 0:
-        raise check.fail("t", "expected at least three uniform times from 0 on")
+    if len(t) < 3 or abs(t[0]) > _START or np.ptp(np.diff(t)) > _UNIFORM or t[-1] <= 0:
+        raise check.fail("t", "expected at least three uniform times that begin at 0")
     for member in ("base_quaternion_wxyz", "foot_normal"):
         worst = np.abs(np.linalg.norm(values[member], axis=-1) - 1.0).max()
-        if worst > 1e-6:
+        if worst > _UNIT:
             raise check.fail(member, f"is not of unit length (off by {worst:.2g})")
     heights = values.pop("heightfield")
     origin, spacing = values.pop("heightfield_origin"), values.pop("heightfield_spacing")
@@ -288,6 +298,7 @@ def load(path: str | Path) -> Plan:
         terrain=Heightfield(heights, origin, spacing),
         terrain_raw=None if raw is None else Heightfield(raw, origin, spacing),
         robot=_robot(check, meta),
+        pull_limit=_pull_limit(check, meta, values["foot_adhesive"]),
         solved=bool(solver.get("success", False)) if isinstance(solver, dict) else False,
         meta=meta,
     )

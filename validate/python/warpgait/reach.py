@@ -1,7 +1,7 @@
 """The reach box of a foot: the largest axis-aligned box inside the set that the leg reaches.
 
-The set is sampled on a grid by closed-form inverse kinematics. A contact point counts as reached when the foot's centre,
-one radius along the terrain's normal, is reached for level ground and for ground tilted four ways.
+The set is sampled on a grid by closed-form inverse kinematics. A contact point counts as reached if the leg reaches the foot's center, one
+radius along the terrain's normal, on level ground and on ground tilted in four directions.
 """
 
 from __future__ import annotations
@@ -9,22 +9,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import Array, Bools, Integers
 from .kinematics import Leg
-from .model import Array
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class ReachRules:
     """What counts as reached, beyond the joint limits."""
 
-    knee: tuple[float, float] = (0.35, 2.6)  # rad, neither stretched (singular) nor folded
+    knee: tuple[float, float] = (0.35, 2.6)  # rad, least and greatest bend: neither stretched (singular) nor folded
     flexion: float = float(np.deg2rad(100.0))  # rad, largest |HFE|
     tilt: float = float(np.deg2rad(30.0))  # rad, of the ground
-    side: float = 0.03  # m, a foot keeps to its own quadrant by this much
+    side: float = 0.03  # m, of a foot inside its own quadrant
     clearance: float = 0.0  # m, between foot and trunk
 
 
@@ -36,7 +33,7 @@ class Box:
     half_size: Array  # (3,)
 
 
-def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRules) -> Mask:
+def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRules) -> Bools:
     """Whether contact points (..., 3), base frame, m, belong to the reach set of `leg`."""
     s, c = np.sin(rules.tilt), np.cos(rules.tilt)
     ok = np.ones(contact.shape[:-1], bool)
@@ -53,8 +50,8 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
     return ok
 
 
-def largest_rectangle(mask: Mask) -> tuple[int, int, int, int, int]:
-    """Area and bounds (area, i0, i1, j0, j1; inclusive) of the largest all-true rectangle: the histogram-and-stack method, O(cells)."""
+def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:
+    """Area and inclusive bounds (area, i0, i1, j0, j1) of the largest all-true rectangle, by histograms and a stack, in O(cells)."""
     heights = np.zeros(mask.shape[1], int)
     best = (0, 0, 0, 0, 0)
     for i, row in enumerate(mask):
@@ -70,12 +67,10 @@ def largest_rectangle(mask: Mask) -> tuple[int, int, int, int, int]:
     return best
 
 
-def largest_cuboid(
-    mask: Mask, least: tuple[int, int, int] = (1, 1, 1)
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
-    """First and last index (3,) of the largest all-true cuboid with at least `least` cells an axis; None if there is none.
+def largest_cuboid(mask: Bools, least: tuple[int, int, int] = (1, 1, 1)) -> tuple[Integers, Integers] | None:
+    """First and last index (3,) of the largest all-true cuboid with at least `least` cells along each axis, or None.
 
-    Every range of layers is intersected, and the largest rectangle of the intersection taken.
+    For each range of layers, it takes the largest rectangle in their intersection.
     """
     best, bounds = 0, None
     layers = mask.shape[2]
@@ -97,13 +92,13 @@ def largest_cuboid(
 def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float = 0.01) -> Box:
     """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m.
 
-    Grid points at both ends of the box are reached, so the box is as wide as the points are apart.
+    The grid points at both ends of the box are reached, so its edges are the distances between them.
     """
     reach = leg.thigh + leg.shank + abs(leg.lateral) + radius
     axes = [np.arange(np.floor((h - reach) / resolution), (h + reach) / resolution) * resolution for h in leg.hip]
     axes[2] = axes[2][axes[2] < leg.hip[2]]
     mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
-    cells = np.ceil(least / resolution - 1e-9).astype(int) + 1
+    cells = np.ceil(least / resolution - 1e-9).astype(int) + 1  # rounding must not add a cell
     bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])))
     if bounds is None:
         raise ValueError(f"leg {leg.name} reaches no box of {least} m")

@@ -1,4 +1,4 @@
-"""The plan at control rate: what the controllers follow."""
+"""The plan at the control rate: what the controllers follow."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Slerp
 
-from .plan import Array, Bools, Plan
-from .rolling import Rolling, none
+from .arrays import Array, Bools
+from .geometry import rotation_from_wxyz
+from .plan import Plan
+from .rolling import Rolling, no_rolling
 
 
 @dataclass(frozen=True)
 class Reference:
-    """K samples at a fixed step; world frame, SI. Foot centres are one radius above the contact points, along the normal."""
+    """K samples at a fixed step; world frame, SI. In stance, a foot's center is one radius from the contact point, along the normal."""
 
     t: Array  # (K,)
     com: Array  # (K, 3)
@@ -23,33 +25,31 @@ class Reference:
     rotation: Array  # (K, 3, 3) body to world
     angular_velocity: Array  # (K, 3)
     angular_acceleration: Array  # (K, 3)
-    foot: Array  # (K, E, 3) centres
+    foot: Array  # (K, E, 3) centers
     foot_velocity: Array  # (K, E, 3)
     foot_acceleration: Array  # (K, E, 3)
-    normal: Array  # (K, E, 3) of the terrain in stance; in the air, from contact point to centre
+    normal: Array  # (K, E, 3) of the terrain in stance; in the air, from contact point to center
     force: Array  # (K, E, 3)
     contact: Bools  # (K, E)
 
 
 def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None = None) -> Reference:
-    """Evaluate `plan` at `rate` Hz from 0 to its end; `rolling` moves the feet's centres.
+    """Evaluate `plan` at `rate` Hz from 0 to its end; `rolling` moves the feet's centers.
 
-    Positions by cubic Hermite interpolation of the plan's samples and velocities, orientation by spherical interpolation,
-    all else linearly; contact is that of the sample before. A force counts only while its foot is in contact.
+    Positions are cubic Hermite interpolants of the plan's samples and velocities. Orientations are interpolated spherically, all else
+    linearly. Contact is that of the sample before. Forces are zero where a foot is not in contact.
     """
-    rolling = rolling or none(plan)
+    rolling = rolling or no_rolling(plan)
     t = np.arange(round(plan.duration * rate) + 1) / rate
     t = np.minimum(t, plan.duration)
-    before = np.clip(np.floor(t / plan.t[1] + 1e-6).astype(int), 0, len(plan.t) - 1)
+    before = np.clip(np.floor(t / plan.t[1] + 1e-6).astype(int), 0, len(plan.t) - 1)  # rounding must not choose the sample before
     contact = plan.foot_contact[before]
 
     def linear(values: Array) -> Array:
         result: Array = make_interp_spline(plan.t, values, k=1)(t)
         return result
 
-    quaternion = plan.base_quaternion_wxyz[:, [1, 2, 3, 0]]
-    rotation = Slerp(plan.t, Rotation.from_quat(quaternion))(t).as_matrix()
-    # The centre is the contact point plus radius times a direction, which turns while the foot swings.
+    # The center is the contact point plus the radius times a direction that turns during a swing.
     normal = linear(plan.center_direction)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     turning = np.gradient(plan.center_direction, plan.t, axis=0) * ~plan.foot_contact[..., None]
@@ -58,7 +58,7 @@ def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None 
         com=CubicHermiteSpline(plan.t, plan.base_position, plan.base_linear_velocity)(t),
         com_velocity=linear(plan.base_linear_velocity),
         com_acceleration=linear(plan.base_linear_acceleration),
-        rotation=rotation,
+        rotation=Slerp(plan.t, rotation_from_wxyz(plan.base_quaternion_wxyz))(t).as_matrix(),
         angular_velocity=linear(plan.base_angular_velocity),
         angular_acceleration=linear(plan.base_angular_acceleration),
         foot=CubicHermiteSpline(plan.t, plan.foot_position, plan.foot_velocity)(t)

@@ -1,13 +1,13 @@
-"""The rendering process of `film.py`: `python -m warpgait.render JOB`. Imports little, for it starts anew for every film."""
+"""The rendering process of `film.py`: `python -m warpgait.render JOB`. It imports little, because it is started for each film."""
 
 from __future__ import annotations
 
 import json
-import os
 import struct
 import subprocess
 import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,16 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from .arrays import Array
+from .files import replacing
+
 Image = npt.NDArray[np.uint8]
+
+CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION = 2.2, 125.0, -18.0  # m, degrees
+CAMERA_DROP = 0.2  # m: the camera looks this far below the center of mass, so that the ground is in the picture
+ARROW_LENGTH, ARROW_RADIUS = 0.8, 0.02  # m; the length is that of a force of m g
+ARROW_COLOR = np.array([0.1, 0.8, 0.2, 1.0], np.float32)  # green
+LEAST_FORCE = 0.01  # of m g: smaller forces have no arrow
 
 
 def png(image: Image) -> bytes:
@@ -30,72 +39,60 @@ def png(image: Image) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines.tobytes(), 9)) + chunk(b"IEND", b"")
 
 
-class _VideoWriter:
-    """Feeds raw frames to ffmpeg."""
-
-    def __init__(self, target: Path, size: tuple[int, int], ffmpeg: str, frames_per_second: int) -> None:
-        self.target, self.temporary = target, target.with_name(f".{target.stem}.{os.getpid()}.mp4")
-        picture = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(frames_per_second), "-i", "-"]
-        command = [
-            ffmpeg,
-            "-y",
-            "-loglevel",
-            "error",
-            *picture,
-            "-pix_fmt",
-            "yuv420p",
-            "-movflags",
-            "+faststart",
-            str(self.temporary),
-        ]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE)
-
-    def add(self, image: Image) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(image.tobytes())
-
-    def close(self) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.close()
-        if self.process.wait() != 0:
-            self.temporary.unlink(missing_ok=True)
-            raise SystemExit("ffmpeg failed")
-        self.temporary.replace(self.target)
+def _encoder(target: Path, size: tuple[int, int], ffmpeg: str, frames_per_second: int) -> subprocess.Popen[bytes]:
+    """An ffmpeg that makes an MP4 of raw frames from its standard input."""
+    frames = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(frames_per_second), "-i", "-"]
+    film = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(target)]
+    return subprocess.Popen([ffmpeg, "-y", "-loglevel", "error", *frames, *film], stdin=subprocess.PIPE)
 
 
-def _arrows(scene: Any, points: npt.NDArray[np.float64], forces: npt.NDArray[np.float64]) -> None:
-    """Planned forces as green arrows, 0.8 m for the robot's weight."""
-    color = np.array([0.1, 0.8, 0.2, 1.0], np.float32)
+def _arrows(scene: Any, points: Array, forces: Array) -> None:
+    """Planned forces (E, 3), as fractions of m g, as arrows at `points` (E, 3)."""
+    arrow = mujoco.mjtGeom.mjGEOM_ARROW
     for point, force in zip(points, forces, strict=True):
-        if np.linalg.norm(force) > 0.01 and scene.ngeom < scene.maxgeom:
+        if np.linalg.norm(force) > LEAST_FORCE and scene.ngeom < scene.maxgeom:
             geom = scene.geoms[scene.ngeom]
-            mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), np.zeros(9), color)
-            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.02, point, point + 0.8 * force)
+            mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), ARROW_COLOR)
+            mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, point, point + ARROW_LENGTH * force)
             scene.ngeom += 1
 
 
-def main(job_text: str) -> None:
-    """`job_text` is JSON: `model` and `frames` (files), `size` (width, height), `output` (an .mp4, or a folder), `ffmpeg`, `frames_per_second`."""
-    job = json.loads(job_text)
+def _images(job: dict[str, Any]) -> Iterator[Image]:
+    """The frames of a job, rendered."""
     model, frames = mujoco.MjModel.from_binary_path(job["model"]), np.load(job["frames"])
-    output, size = Path(job["output"]), (int(job["size"][0]), int(job["size"][1]))
+    width, height = job["size"]
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
-    camera.distance, camera.azimuth, camera.elevation = 2.2, 125.0, -18.0
-    writer = _VideoWriter(output, size, job["ffmpeg"], job["frames_per_second"]) if output.suffix == ".mp4" else None
-    with mujoco.Renderer(model, size[1], size[0]) as renderer:
-        for i in range(len(frames["qpos"])):
-            data.qpos[:] = frames["qpos"][i]
+    camera.distance, camera.azimuth, camera.elevation = CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION
+    with mujoco.Renderer(model, height, width) as renderer:
+        for qpos, look, points, forces in zip(*(frames[name] for name in ("qpos", "look", "point", "force")), strict=True):
+            data.qpos[:] = qpos
             mujoco.mj_forward(model, data)
-            camera.lookat[:] = frames["look"][i] - [0, 0, 0.2]
+            camera.lookat[:] = look - [0, 0, CAMERA_DROP]
             renderer.update_scene(data, camera)
-            _arrows(renderer.scene, frames["point"][i], frames["force"][i])
-            image = renderer.render()
-            if writer is not None:
-                writer.add(image)
-            else:
-                (output / f"{i}.png").write_bytes(png(image))
-    if writer is not None:
-        writer.close()
+            _arrows(renderer.scene, points, forces)
+            yield renderer.render()
+
+
+def _write_film(job: dict[str, Any], target: Path) -> None:
+    with replacing(target) as temporary:
+        encoder = _encoder(temporary, job["size"], job["ffmpeg"], job["frames_per_second"])
+        assert encoder.stdin is not None
+        for image in _images(job):
+            encoder.stdin.write(image.tobytes())
+        encoder.stdin.close()
+        if encoder.wait() != 0:
+            raise SystemExit("ffmpeg failed")
+
+
+def main(job_text: str) -> None:
+    """`job_text` is JSON: `model` and `frames` (files), `size` [width, height], `output` (an .mp4, or a folder), `ffmpeg`, `frames_per_second`."""
+    job = json.loads(job_text)
+    output = Path(job["output"])
+    if output.suffix == ".mp4":
+        _write_film(job, output)
+    else:
+        for i, image in enumerate(_images(job)):
+            (output / f"{i}.png").write_bytes(png(image))
 
 
 if __name__ == "__main__":

@@ -1,28 +1,31 @@
 """`python -m warpgait.validate P.plan.npz`: will the robot walk it?
 
-Writes P.report.json, P.report.html and P.replay.npz beside the plan (or into --output). Exit code 0: trackable (pass or marginal);
-1: not trackable; 2: bad input, or something needed is missing.
+Writes P.report.json, P.report.html and P.replay.npz beside the plan, or into --output. Exit code 0: trackable (pass or marginal); 1: not
+trackable; 2: bad input, or something needed is missing.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import InputError
+from .errors import InputError, error_report
+from .files import write_text
+from .settings import MUJOCO_VERSION, Disturbance, Settings
 
 if TYPE_CHECKING:
     from .validation import Validation
 
-# MuJoCo and daqp are imported late, so that a missing one is a message instead of a traceback.
+# MuJoCo and daqp are imported late, so that a missing package gives a message instead of a traceback.
+
+TRACKABLE, NOT_TRACKABLE, ERROR, INTERRUPTED = 0, 1, 2, 130  # exit codes
 
 
 def _stem(plan: Path) -> str:
@@ -37,7 +40,7 @@ def _numbers(count: int, what: str) -> type[argparse.Action]:
             try:
                 numbers = tuple(float(v) for v in str(values).split(","))
             except ValueError:
-                parser.error(f"{option_string} {values}: expected {what}")
+                numbers = ()
             if len(numbers) != count:
                 parser.error(f"{option_string} {values}: expected {what}")
             setattr(namespace, self.dest, numbers)
@@ -45,93 +48,66 @@ def _numbers(count: int, what: str) -> type[argparse.Action]:
     return Numbers
 
 
-def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+def _parser() -> argparse.ArgumentParser:
+    """The command line. Defaults are those of `Settings` and `Disturbance`."""
+    settings, disturbance = Settings(), Disturbance()
     parser = argparse.ArgumentParser(
         prog="warpgait validate", description="Replays a plan on the full robot in MuJoCo and judges it."
     )
     parser.add_argument("plan", type=Path, help="NAME.plan.npz")
-    parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's)")
-    parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's")
-    parser.add_argument("--rate", type=float, default=250.0, metavar="HZ", help="control rate (default 250)")
-    parser.add_argument("--no-second-opinion", action="store_true", help="skip the joint PD replay")
+    parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's folder)")
+    parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's robot")
+    parser.add_argument("--rate", type=float, default=settings.rate, metavar="HZ", help="control rate (default %(default)g)")
+    parser.add_argument("--no-second-opinion", action="store_true", help="skip the replay with joint PD control")
     parser.add_argument("--no-raw", action="store_true", help="skip the replay on the raw heightfield")
     parser.add_argument("--no-pictures", action="store_true", help="no pictures in the report")
     parser.add_argument("--video", action="store_true", help="write NAME.mp4 as well")
     parser.add_argument("--json", action="store_true", help="print the report as JSON and nothing else")
-    parser.add_argument("--no-files", action="store_true", help="write nothing, only print the verdict")
+    parser.add_argument("--no-files", action="store_true", help="write no files, only print the verdict")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error")
-    wrong = parser.add_argument_group("a world that differs from the plan's")
-    wrong.add_argument("--friction", type=float, help="of the ground (default: the plan's)")
-    wrong.add_argument("--mass-factor", type=float, default=1.0, help="on the base body's mass (default 1)")
-    wrong.add_argument(
-        "--push", action=_numbers(5, "START,DURATION,FX,FY,FZ in s and N"), metavar="T,DT,FX,FY,FZ", help="push the base"
+    world = parser.add_argument_group("a world that differs from the plan's; the controller does not know it")
+    world.add_argument("--friction", type=float, help="friction coefficient of the ground (default: the plan's)")
+    world.add_argument(
+        "--mass-factor",
+        type=float,
+        default=disturbance.mass_factor,
+        metavar="FACTOR",
+        help="multiplies the mass of the base body (default %(default)g)",
     )
-    wrong.add_argument(
+    world.add_argument(
+        "--push",
+        action=_numbers(5, "START,DURATION,FX,FY,FZ in s and N"),
+        metavar="T,DT,FX,FY,FZ",
+        help="push the base from time T s for DT s with a force in N",
+    )
+    world.add_argument(
         "--terrain-shift",
         action=_numbers(3, "DX,DY,DZ in m"),
-        default=(0.0, 0.0, 0.0),
+        default=disturbance.terrain_shift,
         metavar="DX,DY,DZ",
-        help="move the ground",
+        help="move the ground, m",
     )
-    wrong.add_argument("--noise", type=float, default=0.0, help="sensor noise; 1 is 1 mm, 0.1°, 2 cm/s, 1°/s")
-    wrong.add_argument("--delay", type=float, default=0.0, metavar="S", help="between measurement and control")
-    wrong.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+    world.add_argument(
+        "--noise",
+        type=float,
+        default=disturbance.noise,
+        metavar="LEVEL",
+        help="sensor noise; level 1 has standard deviations of 1 mm, 0.1°, 2 cm/s and 1°/s (default %(default)g)",
+    )
+    world.add_argument(
+        "--delay",
+        type=float,
+        default=disturbance.delay,
+        metavar="S",
+        help="time between measurement and control (default %(default)g)",
+    )
+    world.add_argument("--seed", type=int, default=disturbance.seed, help="seed of the noise (default %(default)s)")
     return parser
 
 
-def _refuse_nonsense(options: argparse.Namespace) -> None:
-    for name, value in vars(options).items():
-        numbers = value if isinstance(value, tuple) else (value,)
-        if any(isinstance(v, float) and not math.isfinite(v) for v in numbers):
-            raise InputError(f"--{name.replace('_', '-')}: every number must be finite")
-    if options.friction is not None and not 0 < options.friction <= 10:
-        raise InputError(f"--friction {options.friction:g}: must be in (0, 10]")
-    if not 0.1 <= options.mass_factor <= 10:
-        raise InputError(f"--mass-factor {options.mass_factor:g}: must be in [0.1, 10]")
-    if not 0 <= options.noise <= 100:
-        raise InputError(f"--noise {options.noise:g}: must be in [0, 100]")
-    if not 0 <= options.delay <= 0.2:
-        raise InputError(f"--delay {options.delay:g}: must be in [0, 0.2] s")
-    if options.seed < 0:
-        raise InputError(f"--seed {options.seed}: must not be negative")
-    if options.push is not None and not options.push[1] > 0:
-        raise InputError(f"--push: the duration, {options.push[1]:g} s, must be positive")
-    if not 50 <= options.rate <= 500 or 500 % options.rate:
-        raise InputError(f"--rate {options.rate:g}: must be 500 Hz divided by a whole number, and at least 50")
-
-
-@contextmanager
-def _without_opengl() -> Iterator[None]:
-    """MuJoCo loads the OpenGL that $MUJOCO_GL names as it is imported, and fails where there is none; only the rendering process needs it."""
-    wished = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = "disable"
-    try:
-        yield
-    finally:
-        os.environ.pop("MUJOCO_GL")
-        if wished is not None:
-            os.environ["MUJOCO_GL"] = wished
-
-
-def _run(options: argparse.Namespace, folder: Path) -> int:
-    try:
-        with _without_opengl():
-            from . import plan, report, scene, validation
-    except ImportError as error:
-        raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco==3.17.0 daqp numpy scipy") from error
-
-    def say(text: str) -> None:
-        if not (options.quiet or options.json):
-            print(f"validate: {text}", file=sys.stderr)
-
-    loaded = plan.load(options.plan)
-    if not options.no_files:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: no folder for the reports ({error.strerror}); name another one with --output") from error
-    disturbance = scene.Disturbance(
+def _settings(options: argparse.Namespace) -> Settings:
+    """The settings that the options ask for; raises `InputError` for a value that is out of range."""
+    disturbance = Disturbance(
         friction=options.friction,
         mass_factor=options.mass_factor,
         terrain_shift=options.terrain_shift,
@@ -140,22 +116,68 @@ def _run(options: argparse.Namespace, folder: Path) -> int:
         delay=options.delay,
         seed=options.seed,
     )
-    settings = validation.Settings(options.model, options.rate, not options.no_second_opinion, not options.no_raw, disturbance)
-    found = validation.validate(loaded, settings, say)
+    return Settings(options.model, options.rate, not options.no_second_opinion, not options.no_raw, disturbance)
 
+
+@contextmanager
+def _without_opengl() -> Iterator[None]:
+    """On import, MuJoCo loads the OpenGL that $MUJOCO_GL names, and fails if there is none. Only the rendering process needs it."""
+    requested = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        os.environ.pop("MUJOCO_GL")
+        if requested is not None:
+            os.environ["MUJOCO_GL"] = requested
+
+
+def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
+    """Read the plan, replay it, write the files, and print the verdict; returns the exit code."""
+    try:
+        with _without_opengl():
+            from . import plan, validation
+    except ImportError as error:
+        packages = f"mujoco=={MUJOCO_VERSION} daqp numpy scipy"
+        raise InputError(f"a Python package is missing: {error}. Run: pip install {packages}") from error
+
+    def say(text: str) -> None:
+        if not (options.quiet or options.json):
+            print(f"validate: {text}", file=sys.stderr)
+
+    loaded = plan.read_plan(options.plan)
+    if not options.no_files:
+        _make_folder(folder)
+    found = validation.validate(loaded, settings, say)
     if not options.no_files:
         _write(options, folder, found, say)
+    _print(options, folder, found)
+    return TRACKABLE if found.trackable else NOT_TRACKABLE
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: cannot make this folder for the reports ({error.strerror}); name another with --output"
+        ) from error
+
+
+def _print(options: argparse.Namespace, folder: Path, found: Validation) -> None:
+    """The verdict on standard output, as JSON or for people."""
+    from . import report
+
     try:
         if options.json:
             print(json.dumps(report.as_dict(found), allow_nan=False))
         else:
-            _summary(found)
+            _print_summary(found)
             if not options.no_files:
                 print(f"{folder / _stem(options.plan)}.report.html")
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever read our output has enough of it
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0 if report.trackable(found) else 1
 
 
 def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Callable[[str], None]) -> None:
@@ -168,7 +190,7 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
     try:
         if not options.no_pictures:
             say("pictures")
-            pictures = film.strip(found)
+            pictures = film.pictures(found)
         if options.video:
             say("film")
             film.video(found, folder / f"{stem}.mp4")
@@ -180,19 +202,16 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
     report.write_replay(found, folder / f"{stem}.replay.npz")
 
 
-def _summary(found: Validation) -> None:
+def _print_summary(found: Validation) -> None:
     print(f"{found.plan.path.name}: {found.verdict.word} ({found.model_path.stem}, {found.seconds:.1f} s)")
-    for line in found.notes:
-        print(f"  note: {line}")
-    for metric in [*found.metrics, *(m for t in found.trials if t.counts for m in t.metrics)]:
+    for note in found.notes:
+        print(f"  note: {note}")
+    for metric in found.counted_metrics:
         if metric.verdict.value:
-            sign = "≥" if metric.at_least else "≤"
-            print(
-                f"  {metric.verdict.word}: {metric.layer}: {metric.name} {metric.value:.3g} {metric.unit} (pass {sign} {metric.passes:g})"
-            )
+            print(f"  {metric}")
     first = found.first_failure
     if first:
-        print(f"  first failure at {first.time:.2f} s{f', {first.foot}' if first.foot else ''}: {first.what}")
+        print(f"  first failure at {first}")
     for trial in found.trials:
         if not trial.counts:
             print(f"  {trial.name}: {trial.verdict.word}")
@@ -200,43 +219,40 @@ def _summary(found: Validation) -> None:
 
 def main(words: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    options = arguments().parse_args(words)
+    options = _parser().parse_args(words)
     folder = options.output or options.plan.parent
     try:
-        _refuse_nonsense(options)
+        settings = _settings(options)
     except InputError as error:
-        _say_error(options, str(error))
-        return 2
+        _print_error(options, str(error))
+        return ERROR
     try:
-        return _run(options, folder)
+        return _run(options, settings, folder)
     except (InputError, OSError) as error:
-        _say_error(options, str(error))
+        _print_error(options, str(error))
         if not options.no_files and options.plan.is_file() and folder.is_dir():
-            _report_error(folder / f"{_stem(options.plan)}.report.json", options.plan.name, str(error))
-        return 2
+            _write_error(options, folder, str(error))
+        return ERROR
     except KeyboardInterrupt:
         print("validate: interrupted", file=sys.stderr)
-        return 130
-    except Exception:  # exit code 1 means "not trackable", which an error in this program must not say
+        return INTERRUPTED
+    except Exception:  # Python's own exit code, 1, would mean "not trackable"
         traceback.print_exc()
-        _say_error(options, "the replay itself failed; please report it with the plan")
-        return 2
+        _print_error(options, "the replay itself failed; please report this with the plan")
+        return ERROR
 
 
-def _say_error(options: argparse.Namespace, message: str) -> None:
+def _print_error(options: argparse.Namespace, message: str) -> None:
     print(f"error: {message}", file=sys.stderr)
     if options.json:
-        print(json.dumps({"plan": options.plan.name, "verdict": "error", "trackable": False, "error": message}))
+        print(json.dumps(error_report(options.plan.name, message)))
 
 
-def _report_error(target: Path, plan: str, message: str) -> None:
-    """A report that says why there is none, if it can be written at all."""
-    try:
-        from .report import write_error
-
-        write_error(target, plan, message)
-    except (ImportError, OSError):
-        return
+def _write_error(options: argparse.Namespace, folder: Path, message: str) -> None:
+    """A report that says why there is no verdict, if it can be written at all."""
+    text = json.dumps(error_report(options.plan.name, message), indent=2, ensure_ascii=False) + "\n"
+    with suppress(OSError):
+        write_text(folder / f"{_stem(options.plan)}.report.json", text)
 
 
 if __name__ == "__main__":

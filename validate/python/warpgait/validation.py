@@ -1,47 +1,39 @@
-"""A plan in, evidence out: both layers, both controllers, smoothed and raw terrain."""
+"""A plan in, evidence out: open loop and closed loop, both controllers, planned and raw terrain."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from .controllers import JointPD, WholeBody
-from .errors import InputError
-from .metrics import Metric, Verdict, closed_loop, open_loop
+from .arrays import Array
+from .controllers import Controller, JointPD, WholeBody
+from .criteria import Metric, Verdict
+from .metrics import judge_closed_loop, judge_open_loop
 from .model import Indices, check_mujoco, find_model, indices, load_spec
-from .openloop import OpenLoop, analyse
-from .plan import Array, Heightfield, Plan
+from .openloop import OpenLoop, analyze
+from .plan import Heightfield, Plan
 from .reference import Reference, sample
-from .replay import Incident, Replay, run
-from .scene import Disturbance, build
+from .replay import Incident, Replay
+from .scene import build_world
+from .settings import PHYSICS_RATE, Settings
+from .simulation import Simulation
 
-PD_RATE = 500.0  # Hz
-ADHESION_RESERVE = 1.1  # strength of the adhesion over the pull that the plan may use
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How to validate."""
-
-    model: str | None = None  # full model to replay on; default: the plan's robot
-    rate: float = 250.0  # Hz, of the whole-body controller
-    second_opinion: bool = True  # joint PD as well
-    raw: bool = True  # the raw heightfield as well, if the plan has one
-    disturbance: Disturbance = field(default_factory=Disturbance)
+ADHESION_FACTOR = 1.1  # strength of the simulated adhesion, as a multiple of the largest pull that the plan may use
+NOTED_MASS_ERROR = 0.01  # fraction by which the masses of plan and model may differ without a note
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One simulated replay and its judgement."""
+    """One simulated replay and its judgment."""
 
     name: str
-    counts: bool  # towards the verdict
+    counts: bool  # toward the verdict
     terrain: Heightfield
     reference: Reference
     replay: Replay
@@ -60,7 +52,6 @@ class Validation:
 
     plan: Plan
     model_path: Path
-    world: Any  # MuJoCo model with the planned terrain
     index: Indices
     settings: Settings
     analysis: OpenLoop
@@ -71,91 +62,143 @@ class Validation:
     seconds: float
 
     @property
+    def counted_metrics(self) -> list[Metric]:
+        """The metrics that decide the verdict: those of the open loop and of the trials that count."""
+        return self.metrics + [m for t in self.trials if t.counts for m in t.metrics]
+
+    @property
     def verdict(self) -> Verdict:
-        """The worst of the open loop and of the trials that count."""
-        return max([m.verdict for m in self.metrics] + [t.verdict for t in self.trials if t.counts])
+        """The worst of the metrics that count."""
+        return max(m.verdict for m in self.counted_metrics)
+
+    @property
+    def trackable(self) -> bool:
+        """Whether the robot walks the plan: passed, or marginal."""
+        return self.verdict is not Verdict.FAIL
 
     @property
     def shown(self) -> Trial:
-        """The replay to look at: of those that count, the first with the worst verdict."""
+        """The trial that plots and pictures show: of those that count, the first with the worst verdict."""
         return max((t for t in self.trials if t.counts), key=lambda t: t.verdict)
 
     @property
     def first_failure(self) -> Incident | None:
-        """The earliest incident, of a plan that does not pass; at the same time, the open loop's, which needs no simulation to be true."""
+        """The earliest incident of a plan that does not pass. Of incidents at the same time, the open loop's, which needs no simulation."""
         if self.verdict is Verdict.PASS:
             return None
         found = self.incidents + [i for t in self.trials if t.counts for i in t.incidents]
         return min(found, key=lambda i: i.time, default=None)
 
 
-def _notes(plan: Plan, own: Any, path: Path, index: Indices) -> list[str]:
-    """What a reader of the report should know first."""
-    notes = []
-    if not plan.solved:
-        notes.append("The plan itself says that it is not solved.")
-    mass = float(own.body_mass.sum())
-    if abs(mass / plan.robot.mass - 1) > 0.01:
-        notes.append(f"Planned for {plan.robot.mass:.2f} kg ({plan.robot.name}), replayed with {mass:.2f} kg ({path.stem}).")
-    x_min, x_max, y_min, y_max = plan.terrain.extent
-    x, y = plan.foot_position[..., 0], plan.foot_position[..., 1]
-    if x.min() < x_min or x.max() > x_max or y.min() < y_min or y.max() > y_max:
-        notes.append("Feet leave the plan's heightfield; beyond it the replay's terrain is level with the rim.")
-    return notes
+@dataclass(frozen=True)
+class _Robot:
+    """The full robot as the controllers see it, and how its feet stick."""
+
+    path: Path
+    model: Any  # without contacts
+    index: Indices
+    pull: Array  # (E,) N, how hard each foot may pull
+    adhesive: tuple[str, ...]
+    adhesion: float  # N, strength of the adhesion actuators
+
+    @property
+    def preload(self) -> Array:
+        """Adhesion (E,) N that adds to the normal force in the friction law."""
+        return self.pull * ADHESION_FACTOR
 
 
-def _adhesion(plan: Plan) -> tuple[Array, Array, float]:
-    """How hard each foot may pull (E,) N, the preload that friction may count on (E,) N, and the actuators' strength N."""
-    limit = plan.pull_limit * plan.weight
-    pull = np.where(plan.foot_adhesive, limit, 0.0)
-    return pull, pull * ADHESION_RESERVE, limit * ADHESION_RESERVE
-
-
-def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], None] = lambda _: None) -> Validation:
-    """Judge `plan` on its full robot; `say` gets one line a stage."""
-    started = time.perf_counter()
-    settings = settings or Settings()
-    check_mujoco()
-    path = find_model(settings.model or plan.robot.name)
+def _robot(plan: Plan, model: str | None) -> _Robot:
+    """Load `model`, or the full model of the plan's robot."""
+    path = find_model(model or plan.robot.name)
     spec = load_spec(path)
     spec.option.gravity = plan.robot.gravity
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
     own = spec.compile()
-    index = indices(own, plan.foot_names)
-    if not 50 <= settings.rate <= 500 or abs(500 / settings.rate - round(500 / settings.rate)) > 1e-9:
-        raise InputError(f"--rate {settings.rate:g}: the control rate must be 500 Hz divided by a whole number, and at least 50")
-
-    pull, preload, strength = _adhesion(plan)
+    limit = plan.pull_limit * plan.weight
     adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
+    pull = np.where(plan.foot_adhesive, limit, 0.0)
+    return _Robot(path, own, indices(own, plan.foot_names), pull, adhesive, limit * ADHESION_FACTOR)
 
-    def world_on(terrain: Heightfield) -> Any:
-        return build(path, terrain, plan.robot.friction, plan.robot.gravity, adhesive, strength, settings.disturbance)
 
-    say("open loop")
-    world = world_on(plan.terrain)
-    world_index = indices(world, plan.foot_names)
-    analysis = analyse(plan, own, world, world_index)
-    metrics, incidents = open_loop(plan, analysis, index)
-    fine = sample(plan, PD_RATE, index.radius, analysis.rolling)
-    coarse = sample(plan, settings.rate, index.radius, analysis.rolling)
+def _notes(plan: Plan, robot: _Robot) -> list[str]:
+    """What a reader of the report should know first."""
+    notes = []
+    if not plan.solved:
+        notes.append("According to the plan itself, it is not solved.")
+    mass = float(robot.model.body_mass.sum())
+    if abs(mass / plan.robot.mass - 1) > NOTED_MASS_ERROR:
+        notes.append(
+            f"Planned for {plan.robot.mass:.2f} kg ({plan.robot.name}), replayed with {mass:.2f} kg ({robot.path.stem})."
+        )
+    x_min, x_max, y_min, y_max = plan.terrain.extent
+    x, y = plan.foot_position[..., 0], plan.foot_position[..., 1]
+    if x.min() < x_min or x.max() > x_max or y.min() < y_min or y.max() > y_max:
+        notes.append("Feet leave the plan's heightfield. Beyond it, the replay's terrain is level with the rim.")
+    return notes
 
-    def whole_body() -> WholeBody:
-        return WholeBody(own, index, coarse, plan.robot.friction, pull, preload)
 
-    todo: list[tuple[str, bool, Heightfield, Any, Reference, Any]] = [
-        ("closed loop", True, plan.terrain, world, coarse, whole_body())
-    ]
-    if settings.raw and plan.terrain_raw is not None:
-        raw = plan.terrain_raw
-        todo.append(("closed loop, raw terrain", True, raw, world_on(raw), coarse, whole_body()))
-    if settings.second_opinion:
-        joints = analysis.qpos[:, index.qpos]
-        todo.append(("second opinion: joint PD", False, plan.terrain, world, fine, JointPD(own, index, fine, plan.t, joints)))
-    trials = []
-    for name, counts, terrain, model, reference, controller in todo:
+class _Trials:
+    """The simulations of one plan."""
+
+    def __init__(self, plan: Plan, robot: _Robot, world: Any, analysis: OpenLoop, settings: Settings) -> None:
+        """`world` has the planned terrain."""
+        self.plan, self.robot, self.world, self.analysis, self.settings = plan, robot, world, analysis, settings
+        self.reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
+
+    def run(self, say: Callable[[str], None]) -> list[Trial]:
+        """The closed loop on the planned terrain and, if asked for, on the raw terrain and with joint PD."""
+        plan, settings = self.plan, self.settings
+        name = "closed loop"
         say(name)
-        replay = run(model, own, world_index, reference, controller, analysis.qpos[0], settings.disturbance)
-        trials.append(Trial(name, counts, terrain, reference, replay, *closed_loop(plan, replay, reference, index, name)))
-    notes = _notes(plan, own, path, index)
+        trials = [self._trial(name, True, plan.terrain, self.world, self.reference, self._whole_body())]
+        if settings.raw and plan.terrain_raw is not None:
+            name = "closed loop, raw terrain"
+            say(name)
+            raw = _world_of(plan, self.robot, plan.terrain_raw, settings)
+            trials.append(self._trial(name, True, plan.terrain_raw, raw, self.reference, self._whole_body()))
+        if settings.second_opinion:
+            name = "second opinion: joint PD"
+            say(name)
+            reference = sample(plan, PHYSICS_RATE, self.robot.index.radius, self.analysis.rolling)
+            trials.append(self._trial(name, False, plan.terrain, self.world, reference, self._joint_pd(reference)))
+        return trials
+
+    def _whole_body(self) -> WholeBody:
+        robot = self.robot
+        return WholeBody(robot.model, robot.index, self.reference, self.plan.robot.friction, robot.pull, robot.preload)
+
+    def _joint_pd(self, reference: Reference) -> JointPD:
+        joints = self.analysis.qpos[:, self.robot.index.qpos]
+        return JointPD(self.robot.model, self.robot.index, reference, self.plan.t, joints)
+
+    def _trial(
+        self, name: str, counts: bool, terrain: Heightfield, world: Any, reference: Reference, controller: Controller
+    ) -> Trial:
+        index, start = indices(world, self.plan.foot_names), self.analysis.qpos[0]
+        disturbance = self.settings.disturbance
+        replay = Simulation(world, self.robot.model, index, reference, controller, start, disturbance).run()
+        metrics, incidents = judge_closed_loop(name, self.plan, replay, reference, index)
+        return Trial(name, counts, terrain, reference, replay, metrics, incidents)
+
+
+def _world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Settings) -> Any:
+    """The MuJoCo model of the robot on `terrain`."""
+    friction, gravity = plan.robot.friction, plan.robot.gravity
+    return build_world(robot.path, terrain, friction, gravity, robot.adhesive, robot.adhesion, settings.disturbance)
+
+
+def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], None] = lambda _: None) -> Validation:
+    """Judge `plan` on its full robot. `say` gets the name of each stage as it begins."""
+    started = time.perf_counter()
+    settings = settings or Settings()
+    check_mujoco()
+    robot = _robot(plan, settings.model)
+    say("open loop")
+    world = _world_of(plan, robot, plan.terrain, settings)
+    index = indices(world, plan.foot_names)
+    analysis = analyze(plan, robot.model, world, index)
+    metrics, incidents = judge_open_loop(plan, analysis, robot.index)
+    trials = _Trials(plan, robot, world, analysis, settings).run(say)
+    notes = _notes(plan, robot)
     seconds = time.perf_counter() - started
-    return Validation(plan, path, world, world_index, settings, analysis, metrics, incidents, trials, notes, seconds)
+    return Validation(plan, robot.path, index, settings, analysis, metrics, incidents, trials, notes, seconds)

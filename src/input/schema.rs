@@ -1,30 +1,33 @@
 //! The JSON Schema of the input files, and the check of a document against it.
 //!
 //! The Rust types are the single source: their schema says which keys, types and ranges there are, `warpgait schema`
-//! prints it for editors, and the same schema words the errors.
+//! prints it for editors, and the error messages are worded from it.
 
 use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value as Json};
 use toml::Value;
 
-use super::Scenario;
 use super::document::{Document, join};
+use super::words::{closest, show};
 use crate::{Error, Result};
 
-/// The JSON Schema (draft 2020-12) of a scenario file.
-pub fn json_schema() -> Json {
-    schema_of::<Scenario>()
-}
-
-fn schema_of<T: JsonSchema>() -> Json {
+/// The JSON Schema (draft 2020-12) of files with the content `T`.
+pub fn json_schema<T: JsonSchema>() -> Json {
     schemars::schema_for!(T).to_value()
 }
 
-/// Refuses what the schema of `T` does not allow: unknown and missing keys, types, ranges, lengths, NaN and infinity.
-pub(super) fn check<T: JsonSchema>(document: &Document) -> Result<()> {
-    let root = schema_of::<T>();
+/// The content of a document as a `T`.
+///
+/// # Errors
+/// For what the schema of `T` does not allow: unknown and missing keys, wrong types and lengths, values out of range, NaN
+/// and infinity. The message has file, line, key, what was given and what is allowed.
+pub fn read_as<T: DeserializeOwned + JsonSchema>(document: &Document) -> Result<T> {
+    let root = json_schema::<T>();
     let checker = Checker { root: &root, document };
-    checker.table(&root, document.table(), "")
+    checker.table(&root, document.table(), "")?;
+    let malformed = |e: toml::de::Error| Error::input(format!("{}: {}", document.file(), e.message()));
+    document.table().clone().try_into().map_err(malformed)
 }
 
 struct Checker<'a> {
@@ -50,27 +53,66 @@ impl<'a> Checker<'a> {
     }
 
     fn table(&self, schema: &'a Json, table: &toml::Table, path: &str) -> Result<()> {
+        match Variants::of(schema) {
+            Some(variants) => {
+                let chosen = self.chosen(&variants, table, path)?;
+                self.keys(chosen, table, path, Some(&variants))
+            }
+            None => self.keys(schema, table, path, None),
+        }
+    }
+
+    /// The variant that a table's tag names.
+    fn chosen(&self, variants: &Variants<'a>, table: &toml::Table, path: &str) -> Result<&'a Json> {
+        let at = join(path, variants.tag);
+        let names = variants.names();
+        let Some(given) = table.get(variants.tag) else {
+            return Err(self.document.error(&at, format!("missing; it must be {}", one_of(&names))));
+        };
+        match names.iter().position(|name| Some(*name) == given.as_str()) {
+            Some(i) => Ok(&variants.schemas[i]),
+            None => Err(self.not_a_word(&names, given, &at)),
+        }
+    }
+
+    /// Checks the keys and values of a table; `variants` are those of its tagged enum, if it belongs to one.
+    fn keys(
+        &self,
+        schema: &'a Json,
+        table: &toml::Table,
+        path: &str,
+        variants: Option<&Variants<'a>>,
+    ) -> Result<()> {
         let empty = Map::new();
         let properties = schema["properties"].as_object().unwrap_or(&empty);
-        for (key, value) in table {
+        // The tag itself was checked when the variant was chosen.
+        let is_tag = |key: &str| variants.is_some_and(|v| v.tag == key);
+        let with_tag = variants.map(|v| format!("{} = {}", v.tag, properties[v.tag]["const"]));
+        for (key, value) in table.iter().filter(|(key, _)| !is_tag(key)) {
             let at = join(path, key);
-            match properties.get(key) {
-                Some(property) => self.value(property, value, &at)?,
-                None => {
-                    let allowed: Vec<&str> = properties.keys().map(String::as_str).collect();
-                    let guess =
-                        closest(key, &allowed).map_or(String::new(), |k| format!("did you mean `{k}`? "));
-                    let what = format!("unknown key; {guess}allowed here: {}", allowed.join(", "));
-                    return Err(self.document.error(&at, what));
-                }
+            if let Some(property) = properties.get(key) {
+                self.value(property, value, &at)?;
+                continue;
             }
+            let allowed: Vec<&str> = properties.keys().map(String::as_str).filter(|k| !is_tag(k)).collect();
+            let list = allowed.join(", ");
+            let known_elsewhere = variants.is_some_and(|v| v.know(key));
+            let guess = closest(key, &allowed).map_or(String::new(), |k| format!("did you mean `{k}`? "));
+            let what = match &with_tag {
+                Some(tag) if known_elsewhere => format!("not a key of {tag}; allowed with it: {list}"),
+                Some(tag) => format!("unknown key; {guess}allowed with {tag}: {list}"),
+                None => format!("unknown key; {guess}allowed here: {list}"),
+            };
+            return Err(self.document.error(&at, what));
         }
         for required in schema["required"].as_array().into_iter().flatten().filter_map(Json::as_str) {
             if !table.contains_key(required) {
                 let allowed = self.describe(&properties[required]);
-                return Err(self
-                    .document
-                    .error(&join(path, required), format!("missing; it must be {allowed}")));
+                let what = match &with_tag {
+                    Some(tag) => format!("missing; {tag} needs it: {allowed}"),
+                    None => format!("missing; it must be {allowed}"),
+                };
+                return Err(self.document.error(&join(path, required), what));
             }
         }
         Ok(())
@@ -85,21 +127,19 @@ impl<'a> Checker<'a> {
             return Err(self.wrong(schema, value, path));
         }
         if let Some(words) = words(schema) {
-            let given = value.as_str().unwrap_or_default();
-            if words.contains(&given) {
-                return Ok(());
-            }
-            let guess =
-                closest(given, &words).map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
-            let what = format!("given {}, allowed: {}{guess}", show(value), self.describe(schema));
-            return Err(self.document.error(path, what));
+            return match value.as_str() {
+                Some(given) if words.contains(&given) => Ok(()),
+                _ => Err(self.not_a_word(&words, value, path)),
+            };
         }
         let is = |name: &str| match &schema["type"] {
             Json::Array(names) => names.iter().any(|n| n == name),
             one => one == name,
         };
         let fits = match value {
-            Value::Table(table) if is("object") => return self.table(schema, table, path),
+            Value::Table(table) if is("object") || Variants::of(schema).is_some() => {
+                return self.table(schema, table, path);
+            }
             Value::Array(items) if is("array") => {
                 let (least, most) = length(schema);
                 if items.len() < least || items.len() > most {
@@ -119,6 +159,12 @@ impl<'a> Checker<'a> {
         if fits { Ok(()) } else { Err(self.wrong(schema, value, path)) }
     }
 
+    fn not_a_word(&self, words: &[&str], value: &Value, path: &str) -> Error {
+        let guess = closest(value.as_str().unwrap_or_default(), words)
+            .map_or(String::new(), |word| format!("; did you mean \"{word}\"?"));
+        self.document.error(path, format!("given {}, allowed: {}{guess}", show(value), one_of(words)))
+    }
+
     fn wrong(&self, schema: &'a Json, value: &Value, path: &str) -> Error {
         self.document.error(path, format!("given {}, allowed: {}", show(value), self.describe(schema)))
     }
@@ -130,7 +176,10 @@ impl<'a> Checker<'a> {
             return choices.iter().map(|choice| self.describe(choice)).collect::<Vec<_>>().join(", or ");
         }
         if let Some(words) = words(schema) {
-            return words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
+            return one_of(&words);
+        }
+        if let Some(variants) = Variants::of(schema) {
+            return format!("a table with at least {}", variants.tag);
         }
         let name = match &schema["type"] {
             Json::Array(names) => names.iter().filter_map(Json::as_str).find(|&n| n != "null").unwrap_or(""),
@@ -168,20 +217,45 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// The words of an enumeration.
+/// The variants of an internally tagged enum, whose tag is the key that is constant in each of them.
+struct Variants<'a> {
+    tag: &'a str,
+    schemas: &'a [Json],
+}
+
+impl<'a> Variants<'a> {
+    fn of(schema: &'a Json) -> Option<Self> {
+        let schemas = schema["oneOf"].as_array()?;
+        let constant = |key: &str| schemas.iter().all(|s| s["properties"][key]["const"].is_string());
+        let tag = schemas.first()?["properties"].as_object()?.keys().find(|key| constant(key))?;
+        Some(Self { tag, schemas })
+    }
+
+    fn names(&self) -> Vec<&'a str> {
+        self.schemas.iter().filter_map(|s| s["properties"][self.tag]["const"].as_str()).collect()
+    }
+
+    /// Whether any variant has this key.
+    fn know(&self, key: &str) -> bool {
+        self.schemas.iter().any(|s| s["properties"].get(key).is_some())
+    }
+}
+
+fn one_of(words: &[&str]) -> String {
+    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// The words of an enumeration of strings.
 fn words(schema: &Json) -> Option<Vec<&str>> {
     if let Some(words) = schema["enum"].as_array() {
         return Some(words.iter().filter_map(Json::as_str).collect());
     }
-    schema["oneOf"].as_array().map(|choices| {
-        choices
-            .iter()
-            .flat_map(|choice| match choice["const"].as_str() {
-                Some(word) => vec![word],
-                None => words(choice).unwrap_or_default(),
-            })
-            .collect()
-    })
+    let choices = schema["oneOf"].as_array()?;
+    let words = choices.iter().map(|choice| match choice["const"].as_str() {
+        Some(word) => Some(vec![word]),
+        None => words(choice),
+    });
+    Some(words.collect::<Option<Vec<_>>>()?.concat())
 }
 
 fn length(schema: &Json) -> (usize, usize) {
@@ -196,48 +270,4 @@ fn bounds(schema: &Json) -> (Option<f64>, Option<f64>) {
 fn in_range(schema: &Json, x: f64) -> bool {
     let (least, most) = bounds(schema);
     least.is_none_or(|a| x >= a) && most.is_none_or(|b| x <= b)
-}
-
-/// A value as the user wrote it, cut when long.
-pub(super) fn show(value: &Value) -> String {
-    let kind = match value {
-        Value::Table(_) => return "a table".into(),
-        Value::String(_) => " (a string)",
-        Value::Boolean(_) => " (a truth value)",
-        Value::Datetime(_) => " (a date)",
-        Value::Array(items) => return format!("an array of {}: {}", items.len(), cut(&value.to_string())),
-        Value::Integer(_) | Value::Float(_) => "",
-    };
-    format!("{}{kind}", cut(&value.to_string()))
-}
-
-fn cut(text: &str) -> String {
-    if text.chars().count() <= 60 {
-        text.to_owned()
-    } else {
-        format!("{}…", text.chars().take(60).collect::<String>())
-    }
-}
-
-/// The most similar of the allowed words, when similar enough to be what was meant.
-pub(crate) fn closest<'a>(given: &str, allowed: &[&'a str]) -> Option<&'a str> {
-    let best = allowed.iter().map(|word| (edit_distance(given, word), *word)).min()?;
-    let tolerated = 1 + given.chars().count() / 4;
-    (best.0 <= tolerated).then_some(best.1)
-}
-
-/// Levenshtein's distance.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -1,24 +1,22 @@
-//! A TOML file with the line of every key, so that an error can say where.
+//! A TOML file with the line of every key, so that errors can point at it.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::schema;
+use super::words::show;
 use crate::{Error, Result};
 
-/// A parsed file, possibly with values set from the command line.
+/// A parsed file, possibly with values overridden from the command line.
 #[derive(Clone, Debug)]
 pub struct Document {
     file: String,
     table: Table,
-    /// By dotted key (`gait.duty`, `gait.phases[1]`): where it was set.
+    /// Where each value was set, by dotted key (`gait.duty`, `gait.phases[1]`).
     origins: BTreeMap<String, Origin>,
 }
 
@@ -30,7 +28,10 @@ enum Origin {
 }
 
 impl Document {
-    /// Reads a file. Fails when it is not there, not UTF-8 or not TOML.
+    /// Reads a file; also returns its text.
+    ///
+    /// # Errors
+    /// If it cannot be read, is not UTF-8, or is not TOML.
     pub fn read(path: &Path) -> Result<(Self, String)> {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
@@ -39,11 +40,13 @@ impl Document {
         Ok((Self::parse(&file, &text)?, text))
     }
 
-    /// Parses TOML; `file` is the name for messages.
+    /// Parses TOML; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// If the text is not TOML; points at the line.
     pub fn parse(file: &str, text: &str) -> Result<Self> {
-        let line = |span: &Range<usize>| {
-            1 + text.as_bytes()[..span.start.min(text.len())].iter().filter(|&&b| b == b'\n').count()
-        };
+        let breaks: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
+        let line = |span: &Range<usize>| 1 + breaks.partition_point(|&at| at < span.start);
         let malformed = |error: toml::de::Error| {
             let at = error.span().map_or(String::new(), |span| format!(":{}", line(&span)));
             let shown = error.span().and_then(|span| text.lines().nth(line(&span) - 1)).unwrap_or("").trim();
@@ -56,7 +59,10 @@ impl Document {
         Ok(Self { file: file.to_owned(), table, origins })
     }
 
-    /// Sets a value from `key=value` as given to `--set`: the key dotted, the value in TOML or a bare word.
+    /// Sets a value from `key=value`, as given to `--set`: the key is dotted, the value is TOML or a bare word.
+    ///
+    /// # Errors
+    /// If the argument is not of this form, or a part of the key is a value and not a table.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
         let refuse = |why: String| Err(Error::input(format!("--set {assignment}: {why}")));
         let Some((key, value)) = assignment.split_once('=') else {
@@ -77,12 +83,12 @@ impl Document {
             }
             _ => Value::String(value.to_owned()),
         };
-        let (last, folders) = parts.split_last().unwrap_or((&"", &[]));
+        let (last, tables) = parts.split_last().unwrap_or((&"", &[]));
         let mut table = &mut self.table;
-        for part in folders {
+        for part in tables {
             table = match table.entry(*part).or_insert_with(|| Value::Table(Table::new())) {
                 Value::Table(inner) => inner,
-                other => return refuse(format!("`{part}` is {} there, not a table", schema::show(other))),
+                other => return refuse(format!("`{part}` is {} there, not a table", show(other))),
             };
         }
         table.insert((*last).to_owned(), value);
@@ -92,12 +98,24 @@ impl Document {
         Ok(())
     }
 
+    /// Its name in messages.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
     /// The values.
     pub fn table(&self) -> &Table {
         &self.table
     }
 
-    /// An input error at a key; the line is that of the key or of the table it is missing from.
+    /// Whether a value was given for a dotted key.
+    pub fn has(&self, key: &str) -> bool {
+        let mut parts = key.split('.');
+        let first = parts.next().and_then(|part| self.table.get(part));
+        parts.fold(first, |value, part| value.and_then(|v| v.get(part))).is_some()
+    }
+
+    /// An input error at a key, with file and line; for a missing key, the line of the table that lacks it.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         let mut known = key;
         let origin = loop {
@@ -113,15 +131,6 @@ impl Document {
             None => self.file.clone(),
         };
         Error::input(format!("{at}: {key}: {what}"))
-    }
-
-    /// The typed content. The JSON Schema of `T` decides what is allowed, so that errors can name it.
-    pub fn typed<T: DeserializeOwned + JsonSchema>(&self) -> Result<T> {
-        schema::check::<T>(self)?;
-        self.table
-            .clone()
-            .try_into()
-            .map_err(|e: toml::de::Error| Error::input(format!("{}: {}", self.file, e.message())))
     }
 }
 
@@ -157,7 +166,7 @@ fn note_value(
     }
 }
 
-/// `prefix.key`, or `key` alone at the top.
+/// `prefix.key`, or just `key` at the top level.
 pub(super) fn join(prefix: &str, key: &str) -> String {
     if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") }
 }

@@ -1,0 +1,115 @@
+//! The plan under check, and what a check finds.
+
+use super::ground::PlanGround;
+use super::laws::CheckedLaw;
+use super::vector::norm;
+use crate::plan::Plan;
+use crate::scenario::Scenario;
+use crate::{Error, Result};
+
+/// Residuals by sample, (N,) each.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    /// s
+    pub t: Vec<f64>,
+    /// ‖m p̈ − Σf − m g‖, % of m g.
+    pub newton: Vec<f64>,
+    /// ‖L̇ − Σ(pᵢ − p)×fᵢ‖, % of m g · 0.3 m.
+    pub euler: Vec<f64>,
+    /// Largest distance of a standing foot from the ground, mm.
+    pub stance_gap: Vec<f64>,
+    /// Largest force beyond the friction cone, % of m g.
+    pub friction: Vec<f64>,
+    /// Largest distance of a foot beyond its reach box, mm.
+    pub reach: Vec<f64>,
+    /// Least clearance of the torso's underside, mm.
+    pub clearance: Vec<f64>,
+}
+
+/// A law with its worst value.
+pub(super) type Finding = (&'static CheckedLaw, Worst);
+
+/// The plan with what all checks use.
+pub(super) struct Subject<'a> {
+    pub plan: &'a Plan,
+    pub scenario: &'a Scenario,
+    pub ground: PlanGround,
+    pub samples: usize,
+    pub feet: usize,
+    /// Time between samples, s.
+    pub step: f64,
+    /// m g, N.
+    pub weight: f64,
+}
+
+impl<'a> Subject<'a> {
+    pub fn new(plan: &'a Plan, scenario: &'a Scenario) -> Result<Self> {
+        let gravity = norm(plan.meta.robot.gravity);
+        let weight = plan.meta.robot.mass * gravity;
+        if !(weight.is_finite() && weight > 0.0) {
+            return Err(Error::input(format!(
+                "meta.robot: mass times gravity is {weight} N, expected more than 0"
+            )));
+        }
+        let samples = plan.t.len();
+        let step = (plan.t[samples - 1] - plan.t[0]) / (samples - 1) as f64;
+        let even = plan.t.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= 1e-6 * step);
+        if !(step > 0.0 && even) {
+            return Err(Error::input("member `t`: the samples are not evenly spaced in time".to_owned()));
+        }
+        Ok(Self {
+            plan,
+            scenario,
+            ground: PlanGround::new(&plan.ground),
+            samples,
+            feet: plan.foot_names.len(),
+            step,
+            weight,
+        })
+    }
+
+    pub fn foot_position(&self, n: usize, e: usize) -> [f64; 3] {
+        self.plan.foot_position[n * self.feet + e]
+    }
+
+    pub fn foot_force(&self, n: usize, e: usize) -> [f64; 3] {
+        self.plan.foot_force[n * self.feet + e]
+    }
+
+    pub fn in_contact(&self, n: usize, e: usize) -> bool {
+        self.plan.foot_contact[n * self.feet + e]
+    }
+
+    /// All pairs of sample and foot.
+    pub fn sample_feet(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let feet = self.feet;
+        (0..self.samples).flat_map(move |n| (0..feet).map(move |e| (n, e)))
+    }
+}
+
+/// The largest value seen, and where.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Worst {
+    pub value: f64,
+    pub sample: Option<usize>,
+    pub foot: Option<usize>,
+}
+
+impl Worst {
+    /// A value that belongs to no single sample, such as a root mean square.
+    pub fn overall(value: f64) -> Self {
+        Self { value, sample: None, foot: None }
+    }
+
+    /// Keeps the larger value.
+    pub fn meet(&mut self, value: f64, sample: usize, foot: Option<usize>) {
+        if value > self.value {
+            *self = Self { value, sample: Some(sample), foot };
+        }
+    }
+}
+
+/// Root mean square.
+pub(super) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

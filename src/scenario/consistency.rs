@@ -1,0 +1,183 @@
+//! Refuses values that are allowed one by one but do not fit together, with file and line, before anything is computed.
+//!
+//! The schema has already checked keys, types and ranges. Only two kinds of refusal come later: what depends on the
+//! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
+
+use super::format::{Formulation, Scenario};
+use super::gait::GaitKind;
+use super::map::MapMethod;
+use super::motion::Law;
+use super::terrain::{HeightmapSpec, TerrainSpec};
+use crate::Result;
+use crate::input::{Document, closest};
+use crate::robot::Robot;
+
+/// More time steps than this are taken for a mistake.
+const MOST_STEPS: f64 = 20_000.0;
+/// Shortest side of a terrain, m.
+const LEAST_SIDE: f64 = 0.5;
+/// Phase durations may miss the horizon by this, s.
+const PHASE_TOLERANCE: f64 = 1e-6;
+
+/// Refuses values that do not fit together. The scenario in a plan is checked without its robot, whose file may be gone.
+pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
+    one_robot(document)?;
+    terrain(document, scenario)?;
+    if let Some(extent) = scenario.terrain.extent() {
+        inside(document, scenario, extent)?;
+    }
+    time_steps(document, scenario)?;
+    law(document, scenario)?;
+    map(document, scenario)?;
+    durations(document, scenario)?;
+    phases(document, scenario)?;
+    if let Some(robot) = robot {
+        adhesive_feet(document, scenario, robot)?;
+        phases_by_foot(document, scenario, robot)?;
+    }
+    Ok(())
+}
+
+fn one_robot(document: &Document) -> Result<()> {
+    if document.has("robot.name") && document.has("robot.file") {
+        return Err(document.error("robot.file", "given together with robot.name; give one of them"));
+    }
+    Ok(())
+}
+
+fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
+    if let Some([x_min, x_max, y_min, y_max]) = scenario.terrain.extent()
+        && !(x_max - x_min >= LEAST_SIDE && y_max - y_min >= LEAST_SIDE)
+    {
+        let what = format!(
+            "given [{x_min}, {x_max}, {y_min}, {y_max}], allowed: [x_min, x_max, y_min, y_max] in m, each max at least {LEAST_SIDE} m above its min"
+        );
+        return Err(document.error("terrain.extent", what));
+    }
+    if let TerrainSpec::Heightmap(spec) = &scenario.terrain
+        && spec.smoothing() > spec.smoothing_limit()
+    {
+        let what = format!(
+            "given {}, allowed: at most {} m, {} times terrain.spacing",
+            spec.smoothing(),
+            spec.smoothing_limit(),
+            HeightmapSpec::SMOOTHING_LIMIT
+        );
+        return Err(document.error("terrain.smoothing", what));
+    }
+    Ok(())
+}
+
+/// Refuses a start or goal outside the ground.
+pub(super) fn inside(document: &Document, scenario: &Scenario, extent: [f64; 4]) -> Result<()> {
+    let [x_min, x_max, y_min, y_max] = extent;
+    for (key, [x, y]) in
+        [("start.position", scenario.start.position), ("goal.position", scenario.goal.position)]
+    {
+        if !(x_min..=x_max).contains(&x) || !(y_min..=y_max).contains(&y) {
+            let what = format!(
+                "given [{x}, {y}], outside the terrain; allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m"
+            );
+            return Err(document.error(key, what));
+        }
+    }
+    Ok(())
+}
+
+fn time_steps(document: &Document, scenario: &Scenario) -> Result<()> {
+    let steps = scenario.horizon / scenario.time_step;
+    if !(4.0..=MOST_STEPS).contains(&steps) {
+        let what = format!(
+            "given {}, which divides the horizon of {} s into {steps:.1} steps; allowed: 4 to {MOST_STEPS} steps",
+            scenario.time_step, scenario.horizon
+        );
+        return Err(document.error("time_step", what));
+    }
+    Ok(())
+}
+
+fn law(document: &Document, scenario: &Scenario) -> Result<()> {
+    if scenario.physics.law == Law::NewtonEuler && scenario.formulation == Formulation::Warped {
+        let what = "given \"newton-euler\", which needs the orientation's second derivative in time; the map of formulation = \"warped\" is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default) or formulation = \"direct\"";
+        return Err(document.error("physics.law", what));
+    }
+    Ok(())
+}
+
+fn map(document: &Document, scenario: &Scenario) -> Result<()> {
+    let used = matches!(scenario.map.method, MapMethod::AcapLocalGlobal | MapMethod::AcapNewton);
+    if document.has("map.scale") && !used {
+        let what = "only allowed with map.method = \"acap-local-global\" or \"acap-newton\"; remove it";
+        return Err(document.error("map.scale", what));
+    }
+    Ok(())
+}
+
+fn durations(document: &Document, scenario: &Scenario) -> Result<()> {
+    let gait = &scenario.gait;
+    let [least, most] = gait.duration_bounds;
+    if least >= most {
+        let what = format!("given [{least}, {most}], allowed: [shortest, longest] in s, the first smaller");
+        return Err(document.error("gait.duration_bounds", what));
+    }
+    if gait.optimize_durations && gait.kind == GaitKind::Stand {
+        let what = "given true, but kind = \"stand\" has no steps whose durations could be optimized; set it to false";
+        return Err(document.error("gait.optimize_durations", what));
+    }
+    if gait.optimize_durations && scenario.discretization.force_knots > 1 {
+        let what = "given true, but discretization.force_knots is not 1; optimized durations change the forces sample by sample, so set force_knots to 1 or this to false";
+        return Err(document.error("gait.optimize_durations", what));
+    }
+    Ok(())
+}
+
+fn phases(document: &Document, scenario: &Scenario) -> Result<()> {
+    let Some(rows) = &scenario.gait.phases else {
+        if scenario.gait.kind == GaitKind::Custom {
+            let what = "missing; kind = \"custom\" needs a row of stance and swing durations for each foot, stance first";
+            return Err(document.error("gait.phases", what));
+        }
+        return Ok(());
+    };
+    if scenario.gait.kind != GaitKind::Custom {
+        return Err(document.error("gait.phases", "only allowed with kind = \"custom\""));
+    }
+    for (foot, row) in rows.iter().enumerate() {
+        let sum: f64 = row.iter().sum();
+        if (sum - scenario.horizon).abs() > PHASE_TOLERANCE {
+            let what = format!("the durations sum to {sum} s, expected the horizon, {} s", scenario.horizon);
+            return Err(document.error(&format!("gait.phases[{foot}]"), what));
+        }
+    }
+    Ok(())
+}
+
+fn adhesive_feet(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    let names = robot.foot_names();
+    let given = &scenario.robot.adhesive_feet;
+    for (i, foot) in given.iter().enumerate() {
+        let what = match () {
+            () if !names.contains(&foot.as_str()) => format!("not a foot of {}", robot.name),
+            () if given[..i].contains(foot) => "given twice".into(),
+            () => continue,
+        };
+        let guess = match closest(foot, &names) {
+            Some(name) if name != foot => format!("; did you mean \"{name}\"?"),
+            _ => String::new(),
+        };
+        let what = format!("\"{foot}\" is {what}; its feet: {}{guess}", names.join(", "));
+        return Err(document.error(&format!("robot.adhesive_feet[{i}]"), what));
+    }
+    Ok(())
+}
+
+fn phases_by_foot(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    match &scenario.gait.phases {
+        Some(rows) if rows.len() != robot.feet.len() => {
+            let names = robot.foot_names().join(", ");
+            let what = format!("given {} rows, allowed: one for each foot: {names}", rows.len());
+            Err(document.error("gait.phases", what))
+        }
+        _ => Ok(()),
+    }
+}

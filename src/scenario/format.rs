@@ -1,0 +1,103 @@
+//! The scenario file as a whole.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::gait::GaitSpec;
+use super::map::MapSpec;
+use super::motion::{ContactSpec, DiscretizationSpec, GoalSpec, MotionSpec, PhysicsSpec, StartSpec};
+use super::solver::SolverSpec;
+use super::terrain::TerrainSpec;
+use crate::input;
+use crate::robot::RobotSpec;
+
+/// A whole scenario file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Version of this format: 1.
+    #[serde(default = "default_schema")]
+    #[schemars(range(min = 1, max = 1))]
+    pub schema: u32,
+    /// The space in which the variables live.
+    #[serde(default)]
+    pub formulation: Formulation,
+    /// Duration of the motion T, s.
+    #[serde(default = "default_horizon")]
+    #[schemars(range(min = 0.1, max = 600.0))]
+    pub horizon: f64,
+    /// Time between two samples of the constraints Δt, s.
+    #[serde(default = "default_time_step")]
+    #[schemars(range(min = 0.001, max = 1.0))]
+    pub time_step: f64,
+    /// The robot.
+    #[serde(default)]
+    pub robot: RobotSpec,
+    /// The ground.
+    pub terrain: TerrainSpec,
+    /// Where the motion starts.
+    pub start: StartSpec,
+    /// Where the motion ends.
+    pub goal: GoalSpec,
+    /// Order and timing of the feet.
+    #[serde(default)]
+    pub gait: GaitSpec,
+    /// Clearances, limits of force and weights of smoothness.
+    #[serde(default)]
+    pub motion: MotionSpec,
+    /// Friction and footholds.
+    #[serde(default)]
+    pub contact: ContactSpec,
+    /// The form of the laws of motion.
+    #[serde(default)]
+    pub physics: PhysicsSpec,
+    /// How finely the motion is discretized.
+    #[serde(default)]
+    pub discretization: DiscretizationSpec,
+    /// How the map φ is computed.
+    #[serde(default)]
+    pub map: MapSpec,
+    /// How the NLP is solved.
+    #[serde(default)]
+    pub solver: SolverSpec,
+}
+
+fn default_schema() -> u32 {
+    1
+}
+fn default_horizon() -> f64 {
+    10.0
+}
+fn default_time_step() -> f64 {
+    0.05
+}
+
+/// The space in which the variables live.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Formulation {
+    /// Eq. 7–13: variables in F, pushed forward by φ.
+    #[default]
+    Warped,
+    /// Eq. 1–5: variables in ambient space (the baseline).
+    Direct,
+    /// The base in ambient space, feet and forces in F.
+    Hybrid,
+}
+
+impl fmt::Display for Formulation {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Warped => "warped",
+            Self::Direct => "direct",
+            Self::Hybrid => "hybrid",
+        })
+    }
+}
+
+/// The JSON Schema (draft 2020-12) of a scenario file.
+pub fn json_schema() -> serde_json::Value {
+    input::json_schema::<Scenario>()
+}

@@ -1,0 +1,134 @@
+//! `[start]`, `[goal]`, `[motion]`, `[contact]`, `[physics]` and `[discretization]`: what the motion must do, and which
+//! laws it obeys.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[start]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StartSpec {
+    /// x, y of the base, m.
+    pub position: [f64; 2],
+    /// Heading, rad; default: towards the goal.
+    pub yaw: Option<f64>,
+}
+
+/// `[goal]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GoalSpec {
+    /// x, y of the base at the end, m; a hard constraint.
+    pub position: [f64; 2],
+    /// Heading at the end, rad; if given, a hard constraint.
+    pub yaw: Option<f64>,
+}
+
+/// `[motion]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionSpec {
+    /// Lowest allowed apex of a swing above the ground, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub swing_clearance: f64,
+    /// Smallest allowed distance of the torso's underside from the ground, m.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub base_clearance: f64,
+    /// Largest normal force on a foot, in units of m g.
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub force_limit: f64,
+    /// Largest pull of an adhesive foot, in units of m g.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub pull_limit: f64,
+    /// Weights of base acceleration and force rate.
+    #[schemars(inner(range(min = 0.0, max = 1e6)))]
+    pub smoothness: [f64; 2],
+}
+
+impl Default for MotionSpec {
+    fn default() -> Self {
+        Self {
+            swing_clearance: 0.06,
+            base_clearance: 0.10,
+            force_limit: 2.0,
+            pull_limit: 1.2,
+            smoothness: [1e-3, 1e-4],
+        }
+    }
+}
+
+/// The form of the friction cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cone {
+    /// Eq. 5, with the true normal of the terrain.
+    #[default]
+    Exact,
+    /// Eq. 9.
+    Conformal,
+}
+
+/// `[contact]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactSpec {
+    /// Coefficient of friction ν.
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub friction: f64,
+    /// Fraction of ν that the plan leaves to the controller: forces stay within (1 − margin) ν.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub friction_margin: f64,
+    /// The form of the friction cone.
+    pub cone: Cone,
+    /// Largest slope |∇h| at a foothold; default: no limit.
+    #[schemars(range(min = 0.01, max = 100.0))]
+    pub max_slope: Option<f64>,
+    /// With `max_slope`: how far a foothold must stay from steeper ground, m.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub edge_margin: f64,
+}
+
+impl Default for ContactSpec {
+    fn default() -> Self {
+        Self { friction: 0.75, friction_margin: 0.0, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
+    }
+}
+
+/// The form of the laws of motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// Position-based, centered differences.
+    #[default]
+    Pcdm,
+    /// Position-based, backward differences: Eq. 11.
+    PcdmBackward,
+    /// Newton and Euler, Eq. 2.
+    NewtonEuler,
+}
+
+/// `[physics]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhysicsSpec {
+    /// The form of the laws of motion.
+    pub law: Law,
+}
+
+/// `[discretization]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiscretizationSpec {
+    /// Distance between the knots of the base's spline, in time steps. More than 1 leaves fewer unknowns per row of physics.
+    #[schemars(range(min = 1, max = 100))]
+    pub base_knots: usize,
+    /// Distance between the nodes of the forces, in time steps.
+    #[schemars(range(min = 1, max = 100))]
+    pub force_knots: usize,
+}
+
+impl Default for DiscretizationSpec {
+    fn default() -> Self {
+        Self { base_knots: 1, force_knots: 1 }
+    }
+}

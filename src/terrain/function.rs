@@ -1,0 +1,36 @@
+//! Ground from a function h(x, y) that can be evaluated anywhere.
+
+use super::ground::{FitError, Ground, GroundReport};
+use crate::error::{Error, Result};
+use crate::heightfield::{Grid, Heightfield};
+use crate::scenario::terrain::Domain;
+
+/// A larger error of the spline is worth a note, m.
+const NOTABLE_ERROR: f64 = 0.002;
+
+/// Samples h over its domain, and compares the spline with h between the samples.
+///
+/// # Errors
+/// [`Error::Key`] for a domain with too many nodes and for heights that a spline cannot have; and those of h.
+pub fn ground(kind: &'static str, domain: &Domain, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Ground> {
+    let grid = Grid::fitted(domain.extent, domain.spacing).map_err(|e| Error::key("terrain.spacing", e))?;
+    let samples = grid.sample(&h)?;
+    let field = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &samples)
+        .map_err(|e| Error::key("terrain", e))?;
+    let mut error = FitError::default();
+    for row in 0..grid.rows - 1 {
+        for column in 0..grid.columns - 1 {
+            let (x, y) = (grid.x(column) + 0.5 * grid.spacing[0], grid.y(row) + 0.5 * grid.spacing[1]);
+            error.add(x, y, field.height(x, y) - h(x, y)?);
+        }
+    }
+    let mut report = GroundReport::of(kind, &field, &error);
+    if error.max > NOTABLE_ERROR {
+        report.notes.push(format!(
+            "the spline misses h(x, y) by up to {:.4} m, near x = {:.3}, y = {:.3}: h has an edge there, or \
+             terrain.spacing is too coarse",
+            error.max, error.at[0], error.at[1]
+        ));
+    }
+    Ok(Ground { field, raw: None, report, inputs: Vec::new() })
+}

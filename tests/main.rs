@@ -1,0 +1,31 @@
+//! The tests through the public interface, in one program: each program of its own would link the whole library again.
+//!
+//! `cargo test --release --test suite terrain::` runs those of `terrain.rs`. Ipopt's are a program apart, for it starts itself again.
+
+mod architecture;
+mod bench;
+mod check;
+mod cli;
+mod common;
+mod derivatives;
+mod durations;
+mod exact;
+mod motions;
+mod plan;
+mod terrain;
+mod terrain_bad_input;
+mod warp_build;
+mod warp_methods;
+mod warp_spline;
+
+#[test]
+fn every_file_is_part_of_the_program() {
+    let declared = include_str!("main.rs");
+    for entry in std::fs::read_dir("tests").unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("main.rs") {
+            let line = format!("mod {};", path.file_stem().unwrap().to_str().unwrap());
+            assert!(declared.lines().any(|declaration| declaration == line), "tests/main.rs has no `{line}`");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+"""What a replay is judged by: every criterion with its limits. `README.md` has the figures from which the limits were chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Verdict(IntEnum):
+    """In order, so that the worst is the largest."""
+
+    PASS = 0
+    MARGINAL = 1
+    FAIL = 2
+
+    @property
+    def word(self) -> str:
+        """pass, marginal or fail."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A metric passes up to `passes`, is marginal up to `marginal`, and fails beyond it."""
+
+    name: str
+    unit: str
+    passes: float
+    marginal: float
+    at_least: bool = False  # the limits are lower bounds
+
+    @property
+    def sign(self) -> str:
+        """≤, or ≥ where the limits are lower bounds."""
+        return "≥" if self.at_least else "≤"
+
+    def judge(self, value: float) -> Verdict:
+        """NaN fails."""
+        sign = -1 if self.at_least else 1
+        if sign * value <= sign * self.passes:
+            return Verdict.PASS
+        return Verdict.MARGINAL if sign * value <= sign * self.marginal else Verdict.FAIL
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One line of the report."""
+
+    layer: str  # open loop, or the name of a replay
+    criterion: Criterion
+    value: float
+
+    @property
+    def name(self) -> str:
+        """The criterion's name."""
+        return self.criterion.name
+
+    @property
+    def verdict(self) -> Verdict:
+        """The criterion's verdict on the value."""
+        return self.criterion.judge(self.value)
+
+    def __str__(self) -> str:
+        """Verdict, name, value and limit, for people."""
+        c = self.criterion
+        return f"{self.verdict.word}: {self.layer}: {c.name} {self.value:.3g} {c.unit} (pass {c.sign} {c.passes:g})"
+
+
+LEVER = 0.3
+"""m. Torques are judged as fractions of m g times this length."""
+
+# Open loop.
+UNREACHABLE = Criterion("postures out of reach", "", 0, 0)
+BEYOND_LIMITS = Criterion("postures past a joint limit", "", 0, 0)
+IN_GROUND = Criterion("postures with other parts in the ground", "", 0, 0)
+PLAN_FORCE = Criterion("plan: unexplained force, rms", "% m g", 0.5, 5)
+PLAN_TORQUE = Criterion("plan: unexplained torque, rms", f"% m g·{LEVER:g} m", 0.5, 5)
+BODY_FORCE = Criterion("full body: unexplained force, rms", "m g", 0.05, 0.20)
+BODY_TORQUE = Criterion("full body: unexplained torque, rms", f"m g·{LEVER:g} m", 0.10, 0.20)
+PEAK_TORQUE = Criterion("peak joint torque", "of limit", 0.9, 1.0)
+PEAK_SPEED = Criterion("peak joint speed", "of limit", 0.9, 1.0)
+
+# Closed loop.
+FALL = Criterion("fall", "", 0, 0)
+STRAY_CONTACTS = Criterion("contacts other than feet", "samples", 0, 0)
+NO_SOLUTION = Criterion("controller without solution", "% of steps", 0, 1)
+COM_RMS = Criterion("center of mass, rms", "mm", 7, 40)
+COM_MAX = Criterion("center of mass, max", "mm", 20, 100)
+ROTATION_RMS = Criterion("rotation, rms", "°", 1, 3)
+ROTATION_MAX = Criterion("rotation, max", "°", 3, 8)
+FEET_RMS = Criterion("feet, rms", "mm", 5, 25)
+SLIP = Criterion("slip per step", "mm", 3, 10)
+CONTACT_MISMATCH = Criterion("contact mismatch", "% of samples", 1.5, 4)
+SATURATION = Criterion("torque at its limit", "% of samples", 0.5, 6)
+FOOT_FORCES = Criterion("foot forces, rms", "m g", 0.08, 0.15)
+NET_FORCE = Criterion("net force, rms", "m g", 0.07, 0.15)
+FORCE_CORRELATION = Criterion("vertical force, correlation", "", 0.98, 0.95, at_least=True)
