@@ -1,4 +1,4 @@
-//! Evaluation of φ, the inner loop of the NLP, and building it.
+//! The warp map φ: its evaluation, which is the inner loop of the NLP, and its construction.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -12,7 +12,7 @@ fn evaluation(criterion: &mut Criterion) {
     let field = Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.02, |x, y| Ok(height(x, y)))
         .expect("a valid terrain");
     let map = WarpMap::shear(&field, &MapSpec::default()).expect("a valid map");
-    // Points along a line, as a motion visits them.
+    // Points along a line, like those of a motion.
     let points: Vec<[f64; 3]> =
         (0..256).map(|i| f64::from(i) / 256.0).map(|t| [4.0 * t - 2.0, 3.0 * t - 1.5, 0.5 * t]).collect();
     let mut at = 0;

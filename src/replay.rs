@@ -1,4 +1,4 @@
-//! The way to the Python package that replays plans on the full robot (`validate/`): where it is, and what its report says.
+//! Finds the Python package that replays plans on the full robot (`validate/`), and reads its reports.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -7,20 +7,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-/// Exits with 0 when Python finds the package; does not import it, which would take a second. Any folder called `warpgait` (a clone of the
-/// repository, seen from above) is found as a package, too, but as one without an origin.
+/// Exits with 0 when Python finds the package, without importing it, which would take a second. To Python, any folder named
+/// `warpgait` in the working folder, such as a clone of the repository, is a package, too, but one without an origin.
 const HAS_PACKAGE: &str = "import importlib.util, sys; \
      found = importlib.util.find_spec('warpgait'); sys.exit(found is None or found.origin is None)";
 
-/// A Python that has the package: of the `.venv` of the working folder, those above the program, or `python3`.
+/// How many folders above the program are searched: for `target/release/warpgait`, this reaches the repository.
+const FOLDERS_ABOVE: usize = 4;
+
+/// A Python that has the package: that of `.venv` in the working folder or in a folder above the program, or `python3`.
 ///
 /// # Errors
-/// When none has it; the message says how to install it.
+/// When none has it; the message tells how to install it.
 pub fn python() -> Result<PathBuf> {
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
         Error::input(
-            "the replay needs the Python package `warpgait`, found neither in a .venv nor in python3. Install it, in the \
-             folder of the repository: scripts/setup --python; or into an environment of yours: pip install ./validate",
+            "the replay needs the Python package `warpgait`, which neither .venv nor python3 has; to install it, run \
+             scripts/setup --python in the folder of the repository, or pip install ./validate in an environment of yours",
         )
     })
 }
@@ -28,7 +31,7 @@ pub fn python() -> Result<PathBuf> {
 fn candidates() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from(".")];
     if let Ok(program) = std::env::current_exe() {
-        folders.extend(program.ancestors().skip(1).take(4).map(Path::to_path_buf));
+        folders.extend(program.ancestors().skip(1).take(FOLDERS_ABOVE).map(Path::to_path_buf));
     }
     let mut pythons: Vec<PathBuf> = folders.iter().map(|folder| folder.join(".venv/bin/python")).collect();
     pythons.retain(|python| python.exists());
@@ -42,21 +45,21 @@ fn has_package(python: &Path) -> bool {
     command.status().is_ok_and(|status| status.success())
 }
 
-/// What became of a metric, or of a whole replay. Ordered, the worst last.
+/// Verdict on a metric or on a whole replay, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Within the limit for a pass.
     Pass,
-    /// Within the wider one.
+    /// Within the wider limit.
     Marginal,
-    /// Beyond.
+    /// Beyond both.
     Fail,
 }
 
 impl Verdict {
-    /// As reports write it.
-    pub fn word(self) -> &'static str {
+    /// The name in reports.
+    pub fn name(self) -> &'static str {
         match self {
             Verdict::Pass => "pass",
             Verdict::Marginal => "marginal",
@@ -65,47 +68,47 @@ impl Verdict {
     }
 }
 
-/// A line of the report.
+/// A metric of the report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metric {
-    /// Open loop, or the replay it is of.
+    /// "open loop", or the name of the replay.
     #[serde(default)]
     pub layer: String,
     /// What is measured.
     pub name: String,
-    /// None where it is no number.
+    /// None where it is not a number.
     pub value: Option<f64>,
-    /// Of the value.
+    /// Unit of the value and the limits.
     pub unit: String,
     /// Limit for a pass.
     pub pass: f64,
-    /// Limit for marginal.
+    /// Wider limit, for a marginal verdict.
     pub marginal: f64,
-    /// Of this metric.
+    /// Verdict on this metric.
     pub verdict: Verdict,
 }
 
 /// What went wrong first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Incident {
-    /// s.
+    /// When, s.
     pub time: f64,
-    /// Of which foot.
+    /// Name of the foot, where there is one.
     pub foot: Option<String>,
-    /// In words.
+    /// A description.
     pub what: String,
 }
 
-/// The report of a replay, as far as benches look at it.
+/// The part of a replay's report that benches use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tracked {
     /// The worst of all metrics.
     pub verdict: Verdict,
-    /// Of a plan that does not pass.
+    /// The first incident; none for a plan that passes.
     pub first_failure: Option<Incident>,
-    /// Those of the open loop and of every replay that counts, in the order of the report.
+    /// The metrics of the open loop and of every replay that counts, in the order of the report.
     pub metrics: Vec<Metric>,
-    /// Wall time of the validation, without starting Python, s.
+    /// Wall time of the validation without the start of Python, s.
     pub seconds: f64,
 }
 
@@ -129,7 +132,10 @@ struct Layer {
 }
 
 impl Tracked {
-    /// From the text of a report; what is wrong with it otherwise.
+    /// Reads the text of a report.
+    ///
+    /// # Errors
+    /// What is wrong with it.
     pub fn read(report: &[u8]) -> std::result::Result<Self, String> {
         let report: Report =
             serde_json::from_slice(report).map_err(|e| format!("report of the replay: {e}"))?;
@@ -146,7 +152,7 @@ impl Tracked {
         })
     }
 
-    /// The first metric of the report that decides the verdict; none for a pass.
+    /// The first metric whose verdict is that of the report; none for a pass.
     pub fn first_failing(&self) -> Option<&Metric> {
         let decides = |metric: &&Metric| metric.verdict == self.verdict;
         if self.verdict == Verdict::Pass { None } else { self.metrics.iter().find(decides) }

@@ -1,4 +1,4 @@
-//! `warpgait bench`: rows whatever happens, results kept and gone on from, bad input refused.
+//! `warpgait bench`: a row for every case, finished cases kept, bad input refused.
 
 use std::path::Path;
 use std::process::Command;
@@ -41,7 +41,7 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
     assert_eq!(code, 0, "{err}");
     assert_eq!(std::fs::metadata(&kept).unwrap().modified().unwrap(), written);
     let second = results(folder.path(), "table1");
-    // The kept rows are the very same, times included; the one computed again took the same way.
+    // The kept row is identical, times included; the case computed again took as many iterations.
     assert_eq!(second["cases"][1], first["cases"][1]);
     assert_eq!(second["cases"][0]["measured"]["motion"]["iterations"], motion["iterations"]);
     let svg = std::fs::read_to_string(folder.path().join("bench/table1/table1.svg")).unwrap();
@@ -49,7 +49,7 @@ fn finished_cases_are_kept_and_a_damaged_one_is_computed_again() {
 }
 
 #[test]
-fn every_method_of_the_map_is_a_row_with_what_it_is_like() {
+fn every_method_of_the_map_is_a_row_with_its_quality() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["bench", "map", "--quick", "--terrain", "conic", "--json"];
     let (code, out, _) = warpgait(folder.path(), &arguments);
@@ -76,16 +76,16 @@ fn every_method_of_the_map_is_a_row_with_what_it_is_like() {
 }
 
 #[test]
-fn a_case_that_takes_too_long_is_given_up() {
+fn a_case_that_takes_too_long_times_out() {
     let folder = tempfile::tempdir().unwrap();
     // The steepest map takes seconds on any machine.
     let arguments = ["bench", "fig4", "--level", "hard", "--terrain", "pit", "--time-limit", "1"];
     let (code, out, _) = warpgait(folder.path(), &arguments);
     assert_eq!(code, 0);
-    assert!(out.contains("1 of 1 cases fail") && out.contains("took longer than 1 s"), "{out}");
+    assert!(out.contains("1 of 1 cases fail") && out.contains("timed out after 1 s"), "{out}");
 }
 
-/// The process that `parent` has started, from its entry in `/proc`: (id, name, state, parent, …).
+/// The running process whose parent is `parent`.
 #[cfg(target_os = "linux")]
 fn child_of(parent: u32) -> Option<u32> {
     let entries = std::fs::read_dir("/proc").unwrap().flatten();
@@ -93,7 +93,7 @@ fn child_of(parent: u32) -> Option<u32> {
     ids.find(|id| stat(*id).is_some_and(|(state, of)| of == parent && state != 'Z'))
 }
 
-/// State and parent of a process; none when it is gone.
+/// State and parent of a process, from `/proc/ID/stat` (id, name, state, parent, …); none when it has ended.
 #[cfg(target_os = "linux")]
 fn stat(id: u32) -> Option<(char, u32)> {
     let text = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
@@ -101,7 +101,7 @@ fn stat(id: u32) -> Option<(char, u32)> {
     Some((fields.next()?.chars().next()?, fields.next()?.parse().ok()?))
 }
 
-/// Calls again and again until there is an answer, for a minute at most.
+/// Calls `ask` until it answers, for a minute at most.
 #[cfg(target_os = "linux")]
 fn awaited<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     for _ in 0..1200 {
@@ -110,7 +110,7 @@ fn awaited<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
         }
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    panic!("{what} did not come about within a minute");
+    panic!("{what}: not within a minute");
 }
 
 #[test]
@@ -128,15 +128,15 @@ fn a_case_ends_with_its_sweep() {
         let kill = format!("kill -{signal} {}", sweep.id());
         assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
         assert!(!sweep.wait().unwrap().success());
-        awaited("its end", || stat(case).is_none_or(|(state, _)| state == 'Z').then_some(()));
+        awaited("the end of that process", || stat(case).is_none_or(|(state, _)| state == 'Z').then_some(()));
         let left = std::fs::read_dir(folder.path().join("bench/cases")).unwrap().flatten();
         let result = left.map(|file| file.file_name()).find(|name| name.to_string_lossy().contains("result"));
-        assert_eq!(result, None, "SIG{signal}: the case was done before it was to end");
+        assert_eq!(result, None, "SIG{signal}: the case finished before it could be stopped");
     }
 }
 
 #[test]
-fn the_process_of_a_case_fails_loudly() {
+fn the_process_of_a_case_reports_its_error() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), "schema = 1\n").unwrap();
     let (code, out, err) = warpgait(folder.path(), &["bench-case", "plan", "s.toml", "p.npz", "r.json"]);
@@ -153,7 +153,7 @@ fn bad_input_is_refused_before_anything_is_written() {
         (&["bench", "table1", "--jobs", "0"], "1..=256"),
         (&["bench", "table1", "--robot", "dog"], "anymal_towr"),
         (&["bench", "table1", "--level", "medium,steep"], "steep"),
-        (&["bench", "fig8", "--terrain", "pit"], "nothing is left to run"),
+        (&["bench", "fig8", "--terrain", "pit"], "no case matches"),
     ] {
         let (code, out, err) = warpgait(folder.path(), arguments);
         assert_eq!((code, out.as_str()), (2, ""), "{arguments:?}: {err}");

@@ -1,4 +1,4 @@
-//! The command line: exit codes, one clear message, nothing half written.
+//! The command line: exit codes, one message, no incomplete files.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
-/// Bad input: exit code 2, nothing on standard output, one line on standard error that has all the `parts`.
+/// Bad input: exit code 2, nothing on standard output, one line on standard error that contains all `parts`.
 fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
     let before = files(folder);
     let (code, out, err) = warpgait(folder, arguments);
@@ -21,7 +21,7 @@ fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
     assert_eq!(out, "", "{arguments:?}");
     assert_eq!(err.trim_end().lines().count(), 1, "{err}");
     for part in parts {
-        assert!(err.contains(part), "`{part}` is not in: {err}");
+        assert!(err.contains(part), "`{part}` is missing in: {err}");
     }
     assert_eq!(files(folder), before, "{arguments:?} left something behind");
 }
@@ -43,6 +43,10 @@ fn help_and_usage() {
     assert_eq!(warpgait(folder.path(), &[]).0, 2);
     assert_eq!(warpgait(folder.path(), &["chekc"]).0, 2);
     assert_eq!(warpgait(folder.path(), &["check"]).0, 2);
+    for command in ["init", "schema", "solve", "map", "check", "bench", "validate"] {
+        let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
+        assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
+    }
 }
 
 #[test]
@@ -142,12 +146,12 @@ fn check_refuses_bad_input() {
 
 #[cfg(unix)]
 #[test]
-fn validate_hands_over_to_python() {
+fn validate_runs_python() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     let bin = folder.path().join(".venv/bin");
     std::fs::create_dir_all(&bin).unwrap();
-    // Stands in for Python: the package is there, the replay prints its arguments and judges "not trackable".
+    // Poses as Python: it has the package, prints its arguments, and judges the plan not trackable.
     let script = "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\necho \"$@\"\nexit 1\n";
     std::fs::write(bin.join("python"), script).unwrap();
     std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
@@ -168,7 +172,7 @@ fn validate_hands_over_to_python() {
     assert!(out.contains("\"error\""), "{out}");
 }
 
-/// A clone of the repository is a folder called `warpgait`: seen from above, Python takes it for a package.
+/// A clone of the repository is a folder named `warpgait`, which Python in the folder above takes for a package.
 #[cfg(unix)]
 #[test]
 fn a_folder_of_the_same_name_is_not_the_python_package() {
@@ -177,7 +181,7 @@ fn a_folder_of_the_same_name_is_not_the_python_package() {
     let bin = folder.path().join(".venv/bin");
     std::fs::create_dir_all(&bin).unwrap();
     std::fs::create_dir(folder.path().join("warpgait")).unwrap();
-    // The system's Python, which asks for the package as ours does, without the one of the repository's environment.
+    // The search for the package runs in the system's Python, not in that of the repository's environment.
     let script = "#!/bin/sh\n[ \"$1\" = -c ] && exec python3 \"$@\"\necho chosen\n";
     std::fs::write(bin.join("python"), script).unwrap();
     std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
@@ -251,7 +255,7 @@ fn solve_writes_a_plan_that_checks() {
     );
     assert_eq!(warpgait(folder.path(), &["check", "flat.plan.npz", "--quiet"]).0, 0);
 
-    // One iteration is not enough: the plan is written all the same, and says so.
+    // One iteration is not enough: the plan is written nevertheless, and marked as not solved.
     let few = ["solve", "flat.toml", "--set", "solver.max_iterations=1", "-o", "few.plan.npz"];
     let (code, out, _) = warpgait(folder.path(), &few);
     assert!(code == 1 && out.contains("NOT SOLVED"), "{out}");
@@ -266,7 +270,7 @@ fn an_interrupted_solve_writes_what_it_has() {
     std::fs::write(folder.path().join("flat.toml"), FLAT).unwrap();
     let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("warpgait"))
         .current_dir(folder.path())
-        // A tolerance that cannot be met keeps it busy.
+        // With a tolerance that cannot be met, the solve lasts until it is interrupted.
         .args(["solve", "flat.toml", "--quiet", "--set", "solver.tolerance=1e-12", "--set", "horizon=30"])
         .args(["--set", "solver.effort=optimal", "--set", "solver.max_iterations=100000"])
         .spawn()

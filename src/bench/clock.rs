@@ -1,21 +1,21 @@
-//! Time that a process has spent computing.
+//! Processor time of a process.
 
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-/// Ticks a second of the times in `/proc/self/stat`: USER_HZ, which is 100 on every architecture that Linux exports it for
-/// (man 5 proc), whatever the kernel's own rate.
+/// Ticks per second in `/proc/self/stat`: USER_HZ, which is 100 on all architectures, whatever the kernel's own rate
+/// (proc(5)).
 const TICKS: f64 = 100.0;
 
-/// What was counted.
+/// Which time a clock measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClockKind {
-    /// Processor time of the process, user and system, all threads, in steps of 10 ms; other load does not count.
+    /// Processor time of all threads of the process, user and system, in steps of 10 ms. Other load does not count.
     #[default]
     Cpu,
-    /// Time of day, where the operating system does not tell the processor time.
+    /// Wall time, where the operating system does not report processor time.
     Wall,
 }
 
@@ -27,7 +27,7 @@ pub struct CpuClock {
 }
 
 impl CpuClock {
-    /// Starts it.
+    /// Starts a stopwatch.
     pub fn start() -> Self {
         let (last, kind) = match processor_seconds() {
             Some(seconds) => (seconds, ClockKind::Cpu),
@@ -36,7 +36,7 @@ impl CpuClock {
         Self { start: Instant::now(), kind, last }
     }
 
-    /// Which time it tells.
+    /// Which time it measures.
     pub fn kind(&self) -> ClockKind {
         self.kind
     }
@@ -53,7 +53,7 @@ impl CpuClock {
     }
 }
 
-/// Processor time that a process has taken so far, s; none where the operating system does not tell, or it is gone.
+/// Processor time of a process so far, s; none where the operating system does not report it, or the process has ended.
 pub fn processor_seconds_of(process: u32) -> Option<f64> {
     read_seconds(&format!("/proc/{process}/stat"))
 }
@@ -62,12 +62,12 @@ fn processor_seconds() -> Option<f64> {
     read_seconds("/proc/self/stat")
 }
 
-/// utime + stime.
+/// User and system time, s.
 fn read_seconds(stat: &str) -> Option<f64> {
     ticks(&std::fs::read_to_string(stat).ok()?).map(|ticks| ticks / TICKS)
 }
 
-/// Fields 14 and 15. The second field, the name, may hold blanks, but ends with the last `)`.
+/// utime + stime, fields 14 and 15. The second field, the name, may hold blanks, but ends with the last `)`.
 fn ticks(stat: &str) -> Option<f64> {
     let mut fields = stat[stat.rfind(')')? + 1..].split_whitespace().skip(11);
     let mut next = || fields.next()?.parse::<f64>().ok();
@@ -85,7 +85,7 @@ mod tests {
         assert_eq!(ticks("17 (a"), None);
     }
 
-    /// The clock is the whole process's, and so other tests count too: it must advance while this one works, that is all.
+    /// The clock measures the whole process, including tests in other threads, so that only a lower limit can be checked.
     #[test]
     fn advances_with_work() {
         let mut clock = CpuClock::start();

@@ -1,30 +1,30 @@
-//! A case's process ends when the sweep that started it is gone, however that ended.
+//! Ends the process of a case when its sweep ends, for whatever reason.
 
 use std::os::unix::process::parent_id;
 use std::time::Duration;
 
 use crate::{Error, Result};
 
-/// How often a process looks whether its parent is still there.
-const POLL: Duration = Duration::from_millis(200);
-/// Nobody is left to read it: 128 + SIGTERM.
+/// How often a process checks that its parent is still running.
+const PARENT_POLL: Duration = Duration::from_millis(200);
+/// 128 + SIGTERM, the shell's code for a terminated process. No process is left to read it.
 const EXIT_CODE: i32 = 143;
 
-/// From now on this process ends as soon as `parent` is not its parent any more: an orphan is adopted by another process.
-/// What it was writing is left beside its target, not in its place.
+/// From now on this process exits as soon as its parent is no longer `parent`: the system gives orphans another parent.
+/// Files are written atomically, so that none is left incomplete.
 ///
 /// # Errors
 /// Internal, when no thread can be started.
 pub fn end_with(parent: u32) -> Result<()> {
     let watch = move || {
         while parent_id() == parent {
-            std::thread::sleep(POLL);
+            std::thread::sleep(PARENT_POLL);
         }
         std::process::exit(EXIT_CODE);
     };
     std::thread::Builder::new()
         .name("orphan".into())
         .spawn(watch)
-        .map_err(|e| Error::Internal(format!("a thread that watches the parent: {e}")))?;
+        .map_err(|e| Error::Internal(format!("cannot start the thread that watches the parent: {e}")))?;
     Ok(())
 }

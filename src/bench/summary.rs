@@ -1,141 +1,134 @@
-//! From rows to rates, medians and failures; and JSON.
+//! From rows to groups: counts, medians and maxima.
 
 use serde::Serialize;
-use serde_json::json;
 
-use super::case::{Measured, MotionMeasured};
-use super::protocol::{Bench, Case};
-use super::sweep::Row;
-use super::{Options, tracking};
+use super::case::{Case, CaseRow};
+use super::measured::{MapMeasured, MotionMeasured};
 use crate::replay::{Tracked, Verdict};
-use crate::report::number;
-use crate::{Error, Result};
 
-/// Cases that differ only in where the motion goes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Summary of the cases that differ only in start and goal. Figures of motions are medians unless their names end in `max`;
+/// those of the map, which is the same for all cases of a group, are maxima.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Group {
     /// Name of the robot.
     pub robot: String,
     /// Kind of terrain.
     pub terrain: String,
-    /// Level, or the one departed from.
+    /// Level of the terrain, or the one whose parameter is varied.
     pub level: String,
     /// Formulation, or method of the map.
     pub method: String,
-    /// What is varied besides: name and value.
+    /// Name and value of a parameter that the bench varies besides.
     pub parameter: Option<(&'static str, f64)>,
-    /// Cases.
+    /// Number of cases.
     pub cases: usize,
     /// Cases with a motion that meets the tolerance.
     pub solved: usize,
-    /// … and all checks.
+    /// … and passes all checks.
     pub passed: usize,
-    /// Cases without any result.
+    /// Cases without a result.
     pub without_result: usize,
     /// Cases that needed a continuation.
     pub continued: usize,
-    /// Median number of iterations of the solved ones.
+    /// Iterations of the solved cases.
     pub iterations: Option<f64>,
-    /// Greatest number of iterations of the solved ones.
+    /// Maximum of that.
     pub iterations_max: Option<f64>,
-    /// Median of the first iteration that met the tolerance.
+    /// First iteration within the tolerance, of the solved cases.
     pub first_feasible: Option<f64>,
-    /// Median processor time of guess and NLP, s, of all with a result.
+    /// Processor time of guess and NLP, s, of all cases with a motion.
     pub cpu_solve: Option<f64>,
-    /// Greatest of it, s.
+    /// Maximum of that, s.
     pub cpu_solve_max: Option<f64>,
-    /// Processor time of the map where it was built in one of the cases, s.
+    /// Processor time of the map, s, where one of the cases built it.
     pub cpu_map: Option<f64>,
-    /// Median of the largest violations, units of the NLP.
+    /// Largest violation of a case, units of the NLP.
     pub violation: Option<f64>,
-    /// Greatest of them.
+    /// Maximum of that.
     pub violation_max: Option<f64>,
     /// Mean conformal error of the map on the ground, %.
     pub conformal_error: Option<f64>,
-    /// Greatest conformal error of the map on the ground, %.
+    /// Maximum of the conformal error of the map on the ground, %.
     pub conformal_error_max: Option<f64>,
-    /// Greatest distance of the map's bottom from the terrain, mm.
+    /// Maximum distance of the map's bottom from the terrain, mm.
     pub misfit: Option<f64>,
     /// Points where the map is folded.
     pub inversions: Option<f64>,
-    /// The map's energy at the end, m³; energies of different methods cannot be compared.
+    /// Final energy of the map, m³; energies of different methods cannot be compared.
     pub energy: Option<f64>,
-    /// The method that made the map, where the case leaves it open.
+    /// The method that made the map, which `auto` selects.
     pub taken: Option<&'static str>,
-    /// Replays that pass, are marginal, and fail.
+    /// Numbers of replays that pass, are marginal, and fail.
     pub replayed: [usize; 3],
-    /// The first metric that decides against a replay, with the number of replays that it decides, the most frequent first.
+    /// The metrics that decide against replays, each with the number of replays that it decides, most frequent first.
     pub objections: Vec<(String, usize)>,
 }
 
 impl Group {
-    fn of(rows: &[&Row]) -> Self {
+    fn of(rows: &[&CaseRow]) -> Self {
         let case = &rows[0].case;
-        let measured: Vec<&Measured> = rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
-        let motions: Vec<&MotionMeasured> = measured.iter().filter_map(|m| m.motion.as_ref()).collect();
-        let solved: Vec<&MotionMeasured> = motions.iter().copied().filter(|m| m.solved).collect();
-        let of = |all: &[&MotionMeasured], value: fn(&MotionMeasured) -> f64| {
-            all.iter().map(|m| value(m)).collect()
-        };
-        let iterations: Vec<f64> = of(&solved, |m| m.iterations as f64);
-        let violations: Vec<f64> = of(&motions, |m| m.violation);
-        let cpu_solve: Vec<f64> =
-            measured.iter().filter(|m| m.motion.is_some()).map(|m| m.cpu.solve).collect();
-        let tracks: Vec<&Tracked> = measured.iter().filter_map(|m| m.track.as_ref()).collect();
-        let maps = || measured.iter().filter_map(|m| m.map.as_ref().map(|map| (m, map)));
-        Self {
+        let mut group = Self {
             robot: case.robot.clone(),
             terrain: case.terrain.clone(),
             level: case.level.clone(),
             method: case.method.clone(),
             parameter: case.parameter,
             cases: rows.len(),
-            solved: solved.len(),
-            passed: solved.iter().filter(|m| m.passed).count(),
-            without_result: rows.len() - measured.len(),
-            continued: motions.iter().filter(|m| m.continuation).count(),
-            iterations: median(&iterations),
-            iterations_max: greatest(&iterations),
-            first_feasible: median(
-                &solved.iter().filter_map(|m| Some(m.first_feasible? as f64)).collect::<Vec<_>>(),
-            ),
-            cpu_solve: median(&cpu_solve),
-            cpu_solve_max: greatest(&cpu_solve),
-            cpu_map: greatest(
-                &maps().filter(|(_, map)| !map.cached).map(|(m, _)| m.cpu.map).collect::<Vec<_>>(),
-            ),
-            violation: median(&violations),
-            violation_max: greatest(&violations),
-            conformal_error: greatest(
-                &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.mean).collect::<Vec<_>>(),
-            ),
-            conformal_error_max: greatest(
-                &maps().map(|(_, map)| 100.0 * map.report.conformal_ground.max).collect::<Vec<_>>(),
-            ),
-            misfit: greatest(&maps().map(|(_, map)| 1e3 * map.report.misfit_max).collect::<Vec<_>>()),
-            inversions: greatest(
-                &maps().map(|(_, map)| map.report.inverted_points as f64).collect::<Vec<_>>(),
-            ),
-            energy: greatest(&maps().map(|(_, map)| map.report.energy).collect::<Vec<_>>()),
-            taken: maps().map(|(_, map)| map.report.method.name()).next(),
-            replayed: [Verdict::Pass, Verdict::Marginal, Verdict::Fail]
-                .map(|verdict| tracks.iter().filter(|track| track.verdict == verdict).count()),
-            objections: tracking::objections(&tracks),
-        }
+            without_result: rows.iter().filter(|row| row.outcome.is_err()).count(),
+            ..Self::default()
+        };
+        group.add_motions(rows);
+        group.add_maps(rows);
+        group.add_replays(rows);
+        group
+    }
+
+    fn add_motions(&mut self, rows: &[&CaseRow]) {
+        let motions: Vec<&MotionMeasured> = rows.iter().filter_map(|row| row.motion()).collect();
+        let solved: Vec<&MotionMeasured> = motions.iter().copied().filter(|m| m.solved).collect();
+        self.solved = solved.len();
+        self.passed = solved.iter().filter(|m| m.passed).count();
+        self.continued = motions.iter().filter(|m| m.continuation).count();
+
+        let iterations = || solved.iter().map(|m| m.iterations as f64);
+        let violations = || motions.iter().map(|m| m.violation);
+        let with_motion = || rows.iter().filter(|row| row.motion().is_some());
+        let cpu_solve = || with_motion().filter_map(|row| Some(row.measured()?.cpu.solve));
+        self.iterations = median(iterations());
+        self.iterations_max = max(iterations());
+        self.first_feasible = median(solved.iter().filter_map(|m| Some(m.first_feasible? as f64)));
+        self.cpu_solve = median(cpu_solve());
+        self.cpu_solve_max = max(cpu_solve());
+        self.violation = median(violations());
+        self.violation_max = max(violations());
+    }
+
+    fn add_maps(&mut self, rows: &[&CaseRow]) {
+        let maps: Vec<&MapMeasured> = rows.iter().filter_map(|row| row.map()).collect();
+        let largest = |value: fn(&MapMeasured) -> f64| max(maps.iter().map(|map| value(map)));
+        let built = rows.iter().filter(|row| row.map().is_some_and(|map| !map.cached));
+        self.cpu_map = max(built.filter_map(|row| Some(row.measured()?.cpu.map)));
+        self.conformal_error = largest(|map| 100.0 * map.report.conformal_ground.mean);
+        self.conformal_error_max = largest(|map| 100.0 * map.report.conformal_ground.max);
+        self.misfit = largest(|map| 1e3 * map.report.misfit_max);
+        self.inversions = largest(|map| map.report.inverted_points as f64);
+        self.energy = largest(|map| map.report.energy);
+        self.taken = maps.first().map(|map| map.report.method.name());
+    }
+
+    fn add_replays(&mut self, rows: &[&CaseRow]) {
+        let tracks: Vec<&Tracked> = rows.iter().filter_map(|row| row.track()).collect();
+        self.replayed = [Verdict::Pass, Verdict::Marginal, Verdict::Fail]
+            .map(|verdict| tracks.iter().filter(|track| track.verdict == verdict).count());
+        self.objections = objections(&tracks);
     }
 }
 
-/// The groups, in the order of their first row.
-pub fn groups(rows: &[Row]) -> Vec<Group> {
-    let alike = |a: &Row, b: &Row| {
-        let (a, b) = (&a.case, &b.case);
-        let key =
-            |case: &Case| (case.robot.clone(), case.terrain.clone(), case.level.clone(), case.method.clone());
-        key(a) == key(b) && a.parameter == b.parameter
-    };
-    let mut sorted: Vec<Vec<&Row>> = Vec::new();
+/// The groups, in the order of their first rows.
+pub fn groups(rows: &[CaseRow]) -> Vec<Group> {
+    let mut sorted: Vec<Vec<&CaseRow>> = Vec::new();
     for row in rows {
-        match sorted.iter_mut().find(|group| alike(group[0], row)) {
+        match sorted.iter_mut().find(|group| belong_together(&group[0].case, &row.case)) {
             Some(group) => group.push(row),
             None => sorted.push(vec![row]),
         }
@@ -143,158 +136,40 @@ pub fn groups(rows: &[Row]) -> Vec<Group> {
     sorted.iter().map(|group| Group::of(group)).collect()
 }
 
-fn median(values: &[f64]) -> Option<f64> {
-    let mut values = values.to_vec();
+fn belong_together(a: &Case, b: &Case) -> bool {
+    let names = |case: &Case| [&case.robot, &case.terrain, &case.level, &case.method].map(String::clone);
+    names(a) == names(b) && a.parameter == b.parameter
+}
+
+/// The first metric that decides against each replay, counted, most frequent first.
+fn objections(tracks: &[&Tracked]) -> Vec<(String, usize)> {
+    let mut counted: Vec<(String, usize)> = Vec::new();
+    for metric in tracks.iter().filter_map(|track| track.first_failing()) {
+        let name = format!("{}: {}", metric.layer, metric.name);
+        match counted.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => counted.push((name, 1)),
+        }
+    }
+    counted.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    counted
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let n = values.len();
     if n == 0 { None } else { Some(0.5 * (values[(n - 1) / 2] + values[n / 2])) }
 }
 
-fn greatest(values: &[f64]) -> Option<f64> {
-    values.iter().copied().max_by(f64::total_cmp)
-}
-
-/// What became of a case, in a line.
-pub fn verdict(row: &Row) -> String {
-    let measured = match &row.outcome {
-        Ok(measured) => measured,
-        Err(reason) => return reason.clone(),
-    };
-    let Some(motion) = &measured.motion else {
-        return map_verdict(measured);
-    };
-    let walked = measured.track.as_ref().map_or(String::new(), tracking::verdict);
-    let effort = format!("{} iterations, {} s", motion.iterations, number(measured.cpu.solve));
-    if !motion.solved {
-        return format!(
-            "NOT SOLVED ({effort}): {}; {} misses by {}, {}",
-            motion.status,
-            motion.worst_block,
-            number(motion.violation),
-            motion.worst_place
-        );
-    }
-    match failed_checks(motion) {
-        failed if failed.is_empty() => format!("solved, checks hold ({effort}){walked}"),
-        failed => format!("solved ({effort}), CHECK FAILS: {failed}"),
-    }
-}
-
-fn map_verdict(measured: &Measured) -> String {
-    measured.map.as_ref().map_or(String::new(), |map| {
-        let report = &map.report;
-        let folded = match report.inverted_points {
-            0 => String::new(),
-            n => format!(", FOLDED at {n} points"),
-        };
-        let ending = if report.converged { "" } else { ", NOT converged" };
-        format!(
-            "conformal error {} %, misfit {} mm, {} s{ending}{folded}",
-            number(100.0 * report.conformal_ground.mean),
-            number(1e3 * report.misfit_max),
-            number(measured.cpu.map)
-        )
-    })
-}
-
-/// The laws that do not hold, each with its value and limit.
-fn failed_checks(motion: &MotionMeasured) -> String {
-    let failed = motion.checks.iter().filter(|row| !row.passed);
-    let words = failed.map(|row| {
-        let foot = row.foot.as_ref().map_or(String::new(), |foot| format!(" {foot}"));
-        let time = row.time.map_or(String::new(), |time| format!(" at {time:.2} s"));
-        format!("{} {} > {} {}{foot}{time}", row.name, number(row.value), number(row.limit), row.unit)
-    });
-    words.collect::<Vec<_>>().join("; ")
-}
-
-/// Whether a row is as good as it can be.
-pub fn is_good(row: &Row) -> bool {
-    row.outcome.as_ref().is_ok_and(Measured::is_good)
-}
-
-/// `results.json`.
-pub(super) fn json(bench: Bench, options: &Options, rows: &[Row], groups: &[Group]) -> Result<String> {
-    let cases: Vec<serde_json::Value> = rows
-        .iter()
-        .map(|row| {
-            let case = &row.case;
-            json!({
-                "name": case.name,
-                "robot": case.robot,
-                "terrain": case.terrain,
-                "level": case.level,
-                "method": case.method,
-                "parameter": case.parameter,
-                "heading": case.heading,
-                "good": is_good(row),
-                "verdict": verdict(row),
-                "measured": row.outcome.as_ref().ok(),
-            })
-        })
-        .collect();
-    let results = json!({
-        "bench": bench.name(),
-        "version": env!("CARGO_PKG_VERSION"),
-        "robot": options.robot,
-        "machine": machine(),
-        "jobs": options.jobs,
-        "groups": groups,
-        "cases": cases,
-    });
-    serde_json::to_string_pretty(&results).map_err(|e| Error::Internal(format!("results: {e}")))
-}
-
-/// Model and number of the processors, as far as the operating system tells.
-fn machine() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    let count = std::thread::available_parallelism().map_or(0, |n| n.get());
-    format!("{} × {count}", model.map_or("processor of unknown model", |(_, name)| name))
+fn max(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.max_by(f64::total_cmp)
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::fixtures::{replayed_rows, rows};
     use super::*;
-    use crate::bench::case::Cpu;
-    use crate::plan::CheckRow;
-
-    fn row(index: usize, motion: MotionMeasured, seconds: f64) -> Row {
-        let case = Bench::Table1.cases(&Options::default()).remove(2 * index);
-        let cpu = Cpu { solve: seconds, ..Cpu::default() };
-        Row { case, outcome: Ok(Measured { motion: Some(motion), map: None, track: None, cpu }) }
-    }
-
-    /// Four cases: good, not good, not solved, without a result.
-    pub fn rows() -> Vec<Row> {
-        let good = MotionMeasured {
-            solved: true,
-            passed: true,
-            iterations: 10,
-            violation: 1e-5,
-            ..Default::default()
-        };
-        let checks = vec![CheckRow {
-            name: "friction".into(),
-            value: 2.0,
-            unit: "% m g".into(),
-            limit: 0.5,
-            passed: false,
-            time: Some(1.5),
-            foot: Some("LF".into()),
-        }];
-        let slips = MotionMeasured { passed: false, iterations: 20, checks, ..good.clone() };
-        let lost = MotionMeasured {
-            solved: false,
-            status: "too, many \"iterations\"".into(),
-            worst_block: "reach".into(),
-            violation: 0.3,
-            ..good.clone()
-        };
-        let mut broken = row(3, good.clone(), 0.0);
-        broken.outcome = Err("no result (signal: 9)".into());
-        vec![row(0, good, 1.0), row(1, slips, 3.0), row(2, lost, 9.0), broken]
-    }
 
     #[test]
     fn a_group_counts_every_case() {
@@ -310,16 +185,18 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn verdicts_name_the_law_the_block_and_the_reason() {
-        let words: Vec<String> = rows().iter().map(verdict).collect();
-        assert!(words[0].starts_with("solved, checks hold"));
-        assert!(words[1].contains("friction 2.00 > 0.500 % m g LF at 1.50 s"), "{}", words[1]);
-        assert!(words[2].starts_with("NOT SOLVED") && words[2].contains("reach misses by 0.300"));
-        assert_eq!(words[3], "no result (signal: 9)");
+    fn replays_are_counted_by_verdict_and_cause() {
+        let rows = replayed_rows();
+        let groups = groups(&rows);
+        assert_eq!(groups.len(), 1);
+        assert_eq!((groups[0].cases, groups[0].passed, groups[0].replayed), (3, 3, [1, 0, 2]));
+        assert_eq!(groups[0].objections, [("closed loop: slip".to_owned(), 2)]);
+        assert!(rows[0].is_good() && !rows[1].is_good());
     }
 
     #[test]
     fn medians() {
+        let median = |values: &[f64]| super::median(values.iter().copied());
         assert_eq!(median(&[]), None);
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&[4.0, 1.0]), Some(2.5));

@@ -5,24 +5,34 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::Ending;
 use super::console::Console;
-use crate::check::{CheckLimits, CheckReport, check_with};
+use super::ending::Ending;
+use super::figures::figures;
+use crate::check::{CheckLimits, check_with};
 use crate::files::{ensure_writable, write_atomically};
 use crate::plan::Plan;
 use crate::{Result, report};
 
+const EXAMPLES: &str = "\
+Examples:
+  warpgait check hill.plan.npz                        value, limit and verdict of every law
+  warpgait check hill.plan.npz --plot residuals.svg   and a drawing of the residuals over time
+  warpgait check hill.plan.npz --limits limits.toml   with other limits, such as: friction = 1.0
+
+Exit codes: 0 the plan is solved and every check holds; 1 otherwise; 2 bad input.";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct CheckArguments {
-    /// NAME.plan.npz
+    /// The plan, NAME.plan.npz
     plan: PathBuf,
-    /// TOML file of `law = limit`, for laws whose limit should be another
+    /// TOML file with lines `law = limit`, each of which replaces the default limit of a law
     #[arg(long, value_name = "FILE")]
     limits: Option<PathBuf>,
-    /// How smoothly the base moves counts, too
+    /// Check the smoothness of the base's motion, too
     #[arg(long)]
     strict: bool,
-    /// Draw the residuals over time into an SVG file
+    /// Draw the residuals over time to this SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -40,32 +50,16 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
     if let Some(plot) = &arguments.plot {
         write_atomically(plot, report::residuals(&plan, &found).as_bytes())?;
     }
-    console.result(&report::check_table(&found, console.colour()));
-    console.result(&summary(&plan, &found));
+    let solved = plan.meta.solver.success;
+    let state = if solved { "Solved" } else { "Marked as not solved" };
+    console.result(&report::check_table(&found, console.has_color()));
+    console.result(&format!("{state}; {}.", report::check_counts(&found.rows)));
     console.object(&json!({
         "plan": arguments.plan,
         "passed": found.passed,
-        "solved": plan.meta.solver.success,
+        "solved": solved,
         "checks": found.rows,
         "figures": figures(&found),
     }));
-    Ok(if found.passed && plan.meta.solver.success { Ending::Good } else { Ending::NotGood })
-}
-
-/// Measured values without a limit, which JSON could not write as infinite.
-pub(super) fn figures(report: &CheckReport) -> Vec<serde_json::Value> {
-    let object = |row: &crate::plan::CheckRow| json!({ "name": row.name, "value": row.value, "unit": row.unit, "time": row.time, "foot": row.foot });
-    report.figures.iter().map(object).collect()
-}
-
-fn summary(plan: &Plan, found: &CheckReport) -> String {
-    let failed = found.rows.iter().filter(|row| !row.passed).count();
-    let solver = match plan.meta.solver.success {
-        true => "",
-        false => "The plan is marked as not solved. ",
-    };
-    match failed {
-        0 => format!("{solver}All {} checks hold.", found.rows.len()),
-        n => format!("{solver}{n} of {} checks fail.", found.rows.len()),
-    }
+    Ok(if found.passed && solved { Ending::Good } else { Ending::NotGood })
 }

@@ -1,4 +1,4 @@
-//! Where words go: results to standard output, all else to standard error.
+//! Output of commands: results on standard output, everything else on standard error.
 
 use std::io::{IsTerminal, Write};
 
@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::Error;
 
-/// What may be said, and how.
+/// Writes what the options `--json` and `--quiet` allow.
 pub(super) struct Console {
     json: bool,
     quiet: bool,
@@ -22,17 +22,17 @@ impl Console {
         self.json
     }
 
-    /// Whether only errors are wanted.
+    /// Whether only errors are shown.
     pub fn is_quiet(&self) -> bool {
         self.quiet
     }
 
-    /// Colour is for people at a terminal who have not declined it.
-    pub fn colour(&self) -> bool {
+    /// Whether to use color: at a terminal, unless NO_COLOR is set.
+    pub fn has_color(&self) -> bool {
         std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
     }
 
-    /// A result for people, on standard output.
+    /// A result for human readers, on standard output.
     pub fn result(&self, text: &str) {
         if !self.json && !self.quiet {
             print(text);
@@ -46,31 +46,31 @@ impl Console {
         }
     }
 
-    /// What was asked for, whatever the options.
-    pub fn always(&self, text: &str) {
+    /// The output of a command that has no other purpose: it is printed whatever the options.
+    pub fn output(&self, text: &str) {
         print(text);
     }
 
     /// A message on standard error.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            say(text);
+            print_error(text);
         }
     }
 
-    /// An error on standard error; with `--json` as an object as well.
+    /// An error on standard error; with `--json` also as an object.
     pub fn error(&self, error: &Error) {
-        say(&format!("error: {error}"));
+        print_error(&format!("error: {error}"));
         self.object(&json!({ "error": error.to_string() }));
     }
 }
 
-/// A closed pipe (`warpgait … | head`) is no reason to fail.
+/// Errors are ignored: a closed pipe, as in `warpgait … | head`, is no reason to fail.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
-fn say(text: &str) {
+fn print_error(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }

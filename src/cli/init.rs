@@ -1,21 +1,28 @@
-//! `warpgait init` and `warpgait schema`.
+//! `warpgait init`.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::Ending;
 use super::console::Console;
+use super::ending::Ending;
 use crate::files::write_atomically;
 use crate::{Error, Result, scenario};
 
+const EXAMPLES: &str = "\
+Examples:
+  warpgait init                 write scenario.toml
+  warpgait init hill            write hill.toml
+  warpgait init hill --force    replace hill.toml";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct InitArguments {
-    /// Name of the scenario; NAME.toml is written
+    /// Name of the scenario, written to NAME.toml
     #[arg(default_value = "scenario")]
     name: PathBuf,
-    /// Replace a file that is there already
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 }
@@ -30,19 +37,12 @@ pub(super) fn init(arguments: &InitArguments, console: &Console) -> Result<Endin
         }
     };
     if path.exists() && !arguments.force {
-        return Err(Error::input(format!("{}: is there already; --force replaces it", path.display())));
+        return Err(Error::input(format!("{}: already exists; use --force to replace it", path.display())));
     }
     let name = Path::new(path.file_name().unwrap_or_default()).with_extension("");
     write_atomically(&path, scenario::template(&name.to_string_lossy()).as_bytes())?;
     console.object(&json!({ "scenario": path }));
     console.result(&path.display().to_string());
     console.note(&format!("Edit it, then run: warpgait solve {}", path.display()));
-    Ok(Ending::Good)
-}
-
-pub(super) fn schema(console: &Console) -> Result<Ending> {
-    let schema = scenario::json_schema();
-    console
-        .always(&serde_json::to_string_pretty(&schema).map_err(|e| Error::Internal(format!("schema: {e}")))?);
     Ok(Ending::Good)
 }

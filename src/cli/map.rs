@@ -1,14 +1,14 @@
-//! `warpgait map`, and the map within `warpgait solve`.
+//! `warpgait map`.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::Ending;
 use super::console::Console;
-use super::progress::Progress;
+use super::ending::{Ending, listen_for_ctrl_c};
+use super::progress_line::ProgressLine;
 use crate::files::ensure_writable;
 use crate::files::npz::NpzWriter;
 use crate::heightfield::Heightfield;
@@ -18,17 +18,26 @@ use crate::scenario;
 use crate::warp::{MapReport, WarpMap};
 use crate::{Error, Result, terrain};
 
+const EXAMPLES: &str = "\
+Examples:
+  warpgait map hill.toml                                  build the map, or read it from the cache
+  warpgait map hill.toml --no-cache -o hill.map.npz       build it and write it to a file
+  warpgait map hill.toml --set map.method=acap-newton     compare another method
+
+Exit codes: 0 the map converged without folds; 1 it did not; 2 bad input; 130 interrupted.";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct MapArguments {
     /// The scenario whose map is built
     scenario: PathBuf,
     /// Write the map to this .npz file
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Set a value of the scenario; the key dotted, the value in TOML or a bare word
+    /// Override a value of the scenario: a dotted key, and a TOML value or a bare word; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Build the map anew, whatever the cache holds
+    /// Build the map without the cache
     #[arg(long)]
     no_cache: bool,
 }
@@ -38,9 +47,9 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
         ensure_writable(output)?;
     }
     let loaded = scenario::load(&arguments.scenario, &arguments.set)?;
-    super::listen_for_ctrl_c()?;
+    listen_for_ctrl_c()?;
     let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
-    let mut progress = Progress::new(console.is_quiet());
+    let mut progress = ProgressLine::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
     let mut show = |event: &Event| {
         progress.show(event);
@@ -70,8 +79,8 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     Ok(if sound { Ending::Good } else { Ending::NotGood })
 }
 
-/// The map's members as in a plan, its ground, and the report as `meta`.
-fn write(path: &std::path::Path, map: &WarpMap, field: &Heightfield, report: &MapReport) -> Result<()> {
+/// Writes the arrays of map and ground as in a plan, and the report as `meta`.
+fn write(path: &Path, map: &WarpMap, field: &Heightfield, report: &MapReport) -> Result<()> {
     let (grid, samples) = (map.to_grid(), field.grid());
     let mut npz = NpzWriter::create(path)?;
     npz.add_map(&grid)?;

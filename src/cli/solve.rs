@@ -5,43 +5,52 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::console::Console;
-use super::progress::Progress;
-use super::{Ending, beside, check};
-use crate::check::CheckReport;
+use super::ending::{Ending, listen_for_ctrl_c};
+use super::figures::figures;
+use super::progress_line::ProgressLine;
 use crate::files::{ensure_writable, write_atomically};
 use crate::pipeline::{self, Planned};
-use crate::plan::Plan;
-use crate::planner::Motion;
 use crate::planner::derivatives::DerivativeError;
 use crate::scenario::{self, LoadedScenario};
 use crate::{Error, Result, report};
 
-/// Derivatives that differ more than this from central differences are wrong.
+/// Derivatives that differ from central differences by more than this are wrong.
 const DERIVATIVE_TOLERANCE: f64 = 1e-4;
 
+const EXAMPLES: &str = "\
+Examples:
+  warpgait solve hill.toml                               write hill.plan.npz and hill.svg
+  warpgait solve hill.toml -o trot.plan.npz --set gait.kind=trot
+  warpgait solve hill.toml --formulation direct          plan without a map
+  warpgait solve hill.toml --set \"goal.position=[1.5, 0.0]\" --no-plot --json
+
+Exit codes: 0 solved and every check holds; 1 not solved, or a check fails, the plan is written;
+2 bad input, nothing written; 130 interrupted, the best plan so far is written.";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct SolveArguments {
     /// The scenario to solve
     scenario: PathBuf,
-    /// Where the plan goes [default: NAME.plan.npz in the working folder]
+    /// The plan to write [default: NAME.plan.npz in the working folder]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Set a value of the scenario; the key dotted, the value in TOML or a bare word
+    /// Override a value of the scenario: a dotted key, and a TOML value or a bare word; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Same as --set formulation=…
-    #[arg(long, value_name = "warped|direct")]
+    /// Override the formulation: warped, direct or hybrid
+    #[arg(long, value_name = "NAME")]
     formulation: Option<String>,
-    /// Where the drawing of the plan goes, an SVG file [default: NAME.svg beside the plan]
+    /// The drawing of the plan to write, an SVG file [default: NAME.svg next to the plan]
     #[arg(long, value_name = "FILE", conflicts_with = "no_plot")]
     plot: Option<PathBuf>,
     /// Draw nothing
     #[arg(long)]
     no_plot: bool,
-    /// Compare the derivatives with differences before solving
+    /// Compare the derivatives with central differences before solving
     #[arg(long)]
     check_derivatives: bool,
 }
@@ -49,55 +58,32 @@ pub(super) struct SolveArguments {
 pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<Ending> {
     let start = Instant::now();
     let loaded = load(arguments)?;
-    let scenario = &loaded.scenario;
     let output = output(arguments)?;
     let plot =
         (!arguments.no_plot).then(|| arguments.plot.clone().unwrap_or_else(|| beside(&output, ".svg")));
     for file in [Some(&output), plot.as_ref()].into_iter().flatten() {
         ensure_writable(file)?;
     }
-    super::listen_for_ctrl_c()?;
+    listen_for_ctrl_c()?;
 
-    let mut progress = Progress::new(console.is_quiet());
+    let mut progress = ProgressLine::new(console.is_quiet());
     let planned = pipeline::run(&loaded, arguments.check_derivatives, &mut |event| {
         progress.show(event);
         ControlFlow::Continue(())
     })?;
-    // Without a map there is no iterate to keep.
+    // Interrupted before the first iterate: there is no plan to write.
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
-    let Planned { prepared, map: built, plan, motion, check: found, derivatives } = planned;
-    plan.write(&output)?;
+    planned.plan.write(&output)?;
     if let Some(plot) = &plot {
-        write_atomically(plot, report::sheet(&plan).as_bytes())?;
+        write_atomically(plot, report::sheet(&planned.plan).as_bytes())?;
     }
     drop(progress);
 
-    let good_derivatives = derivatives.as_ref().is_none_or(|errors| errors.iter().all(is_right));
-    if let Some(errors) = &derivatives {
-        console.result(&format!("{}\n", report::derivative_table(errors)));
-    }
-    console.result(&format!("{}\n", report::violation_table(&motion.violations, scenario.solver.tolerance)));
-    console.result(&format!("{}\n", report::check_table(&found, console.colour())));
-    console.result(&summary(&plan, &motion, &found, &output, start.elapsed().as_secs_f64()));
-    console.object(&json!({
-        "plan": output,
-        "plot": plot,
-        "solved": motion.solved,
-        "passed": found.passed,
-        "interrupted": motion.interrupted,
-        "solver": plan.meta.solver,
-        "terrain": prepared.ground.report,
-        "map": built.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
-        "violations": motion.violations,
-        "derivatives": derivatives,
-        "checks": found.rows,
-        "figures": check::figures(&found),
-    }));
-    Ok(match () {
-        () if motion.interrupted => Ending::Interrupted,
-        () if motion.solved && found.passed && good_derivatives => Ending::Good,
-        () => Ending::NotGood,
-    })
+    let seconds = start.elapsed().as_secs_f64();
+    print_tables(&planned, loaded.scenario.solver.tolerance, console);
+    console.result(&summary(&planned, &output, seconds));
+    console.object(&object(&planned, &output, plot.as_deref()));
+    Ok(ending(&planned))
 }
 
 fn load(arguments: &SolveArguments) -> Result<LoadedScenario> {
@@ -106,38 +92,77 @@ fn load(arguments: &SolveArguments) -> Result<LoadedScenario> {
     scenario::load(&arguments.scenario, &overrides)
 }
 
-/// The plan's file: as given, or the scenario's name in the working folder.
+/// The plan's file: the one given, or one named after the scenario in the working folder.
 fn output(arguments: &SolveArguments) -> Result<PathBuf> {
     match (&arguments.output, arguments.scenario.file_stem()) {
         (Some(output), _) => Ok(output.clone()),
         (None, Some(stem)) => Ok(PathBuf::from(format!("{}.plan.npz", stem.to_string_lossy()))),
         (None, None) => {
-            Err(Error::input(format!("{}: not the name of a file", arguments.scenario.display())))
+            Err(Error::input(format!("{}: this is not the name of a file", arguments.scenario.display())))
         }
+    }
+}
+
+/// `NAME` of `NAME.plan.npz` with another ending, in the same folder.
+fn beside(plan: &Path, ending: &str) -> PathBuf {
+    let name = plan.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = name.strip_suffix(".plan.npz").or(name.strip_suffix(".npz")).unwrap_or(&name);
+    plan.with_file_name(format!("{stem}{ending}"))
+}
+
+fn print_tables(planned: &Planned, tolerance: f64, console: &Console) {
+    if let Some(errors) = &planned.derivatives {
+        console.result(&format!("{}\n", report::derivative_table(errors)));
+    }
+    console.result(&format!("{}\n", report::violation_table(&planned.motion.violations, tolerance)));
+    console.result(&format!("{}\n", report::check_table(&planned.check, console.has_color())));
+}
+
+fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
+    let (motion, solver) = (&planned.motion, &planned.plan.meta.solver);
+    let [total, map, evaluation, linear] =
+        [seconds, solver.seconds.map, solver.seconds.evaluation, solver.seconds.linear_solver]
+            .map(report::number);
+    let verdict = if motion.solved { "Solved" } else { "NOT SOLVED" };
+    format!(
+        "{verdict}: {} after {} iterations; {}.\n\
+         {total} s in total: map {map} s, evaluation {evaluation} s, linear solver {linear} s.\n\
+         Written: {}",
+        motion.status,
+        motion.iterations,
+        report::check_counts(&planned.check.rows),
+        output.display()
+    )
+}
+
+/// The result for `--json`.
+fn object(planned: &Planned, output: &Path, plot: Option<&Path>) -> Value {
+    let Planned { prepared, map, plan, motion, check, derivatives } = planned;
+    json!({
+        "plan": output,
+        "plot": plot,
+        "solved": motion.solved,
+        "passed": check.passed,
+        "interrupted": motion.interrupted,
+        "solver": plan.meta.solver,
+        "terrain": prepared.ground.report,
+        "map": map.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
+        "violations": motion.violations,
+        "derivatives": derivatives,
+        "checks": check.rows,
+        "figures": figures(check),
+    })
+}
+
+fn ending(planned: &Planned) -> Ending {
+    let right_derivatives = planned.derivatives.as_ref().is_none_or(|errors| errors.iter().all(is_right));
+    match planned.motion.interrupted {
+        true => Ending::Interrupted,
+        false if planned.motion.solved && planned.check.passed && right_derivatives => Ending::Good,
+        false => Ending::NotGood,
     }
 }
 
 fn is_right(error: &DerivativeError) -> bool {
     error.missing == 0 && error.largest <= DERIVATIVE_TOLERANCE
-}
-
-fn summary(plan: &Plan, motion: &Motion, found: &CheckReport, output: &Path, seconds: f64) -> String {
-    let solver = &plan.meta.solver;
-    let [total, map, evaluation, linear] =
-        [seconds, solver.seconds.map, solver.seconds.evaluation, solver.seconds.linear_solver]
-            .map(report::number);
-    let verdict = if motion.solved { "Solved" } else { "NOT SOLVED" };
-    let failed = found.rows.iter().filter(|row| !row.passed).count();
-    let checks = match failed {
-        0 => format!("All {} checks hold.", found.rows.len()),
-        n => format!("{n} of {} checks fail.", found.rows.len()),
-    };
-    format!(
-        "{verdict}: {} after {} iterations. {checks}\n\
-         {total} s in all: map {map} s, evaluation {evaluation} s, linear solver {linear} s.\n\
-         Written: {}",
-        motion.status,
-        motion.iterations,
-        output.display()
-    )
 }

@@ -1,23 +1,48 @@
-//! `warpgait validate`: hands over to the Python package, which replays the plan in MuJoCo.
+//! `warpgait validate`: runs the Python package, which replays the plan in MuJoCo.
 
 use std::ffi::OsString;
-use std::process::{Command, ExitStatus};
+use std::process::{self, ExitStatus};
+
+use clap::Args;
 
 use super::console::Console;
-use super::{Ending, listen_for_ctrl_c};
+use super::ending::{Ending, listen_for_ctrl_c};
 use crate::{Error, Result, ipopt, replay};
 
-pub(super) fn validate(arguments: &[OsString], console: &Console) -> Result<Ending> {
+const EXAMPLES: &str = "\
+Examples:
+  warpgait validate hill.plan.npz                   replay a plan and judge it
+  warpgait validate hill.plan.npz --friction 0.5    on slippery ground
+  warpgait validate -- --help                       all options of the Python package
+
+Exit codes: 0 trackable; 1 not trackable; 2 bad input, or the Python package is missing; 130 interrupted.";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct ValidateArguments {
+    /// NAME.plan.npz and options of the Python package
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "ARGUMENTS")]
+    arguments: Vec<OsString>,
+}
+
+impl ValidateArguments {
+    /// Whether `--json` is among the arguments for Python.
+    pub fn has_json(&self) -> bool {
+        self.arguments.iter().any(|argument| argument == "--json")
+    }
+}
+
+pub(super) fn validate(arguments: &ValidateArguments, console: &Console) -> Result<Ending> {
     let python = replay::python()?;
-    let mut command = Command::new(&python);
-    command.args(["-m", "warpgait.validate"]).args(arguments);
-    if console.is_json() && !arguments.iter().any(|word| word == "--json") {
+    let mut command = process::Command::new(&python);
+    command.args(["-m", "warpgait.validate"]).args(&arguments.arguments);
+    if console.is_json() && !arguments.has_json() {
         command.arg("--json");
     }
     if console.is_quiet() {
         command.arg("--quiet");
     }
-    // Ctrl-C reaches Python, too, which says so and ends; the prompt is not to come back before.
+    // Ctrl-C reaches Python, too, which reports it and ends. This process waits for that.
     listen_for_ctrl_c()?;
     ending(command.status().map_err(|e| Error::io(&python, e))?)
 }
@@ -27,7 +52,7 @@ fn ending(status: ExitStatus) -> Result<Ending> {
         Some(code) => Ok(Ending::Code(u8::try_from(code).unwrap_or(1))),
         None if ipopt::INTERRUPT.is_raised() => Ok(Ending::Interrupted),
         None => Err(Error::Internal(format!(
-            "the replay crashed or was ended from outside ({status}); where memory is short, the system does that"
+            "the replay crashed or was killed ({status}); the system kills programs when memory runs out"
         ))),
     }
 }

@@ -1,6 +1,7 @@
-//! What people read: tables for the terminal and drawings of a plan.
+//! Results for human readers: tables for the terminal and drawings of a plan.
 
 pub(crate) mod axes;
+pub(crate) mod color;
 mod residuals;
 mod sheet;
 pub(crate) mod svg;
@@ -8,4 +9,4 @@ pub mod table;
 
 pub use residuals::residuals;
 pub use sheet::sheet;
-pub use table::{check_table, derivative_table, map_table, number, violation_table};
+pub use table::{check_counts, check_table, derivative_table, map_table, number, violation_table};

@@ -1,14 +1,28 @@
-//! One sheet that shows a plan: from above, from the side, contacts, forces, convergence.
+//! One page that shows a plan: from above, from the side, contacts, forces, convergence.
 
 use super::axes::{Axes, range};
-use super::svg::{Font, Svg, foot_colour};
-use super::table::number;
+use super::color::{foot_color, ramp};
+use super::svg::{Font, Svg};
+use super::table::{check_counts, number};
 use crate::plan::{GroundGrid, Plan};
 
-/// Levels of the shading.
-const LEVELS: usize = 14;
-/// Rows and columns of the shading.
+/// Bands of height, each of one color.
+const BANDS: usize = 14;
+/// Rows and columns of the shaded ground.
 const RASTER: usize = 150;
+/// The height scale spans at least this, so that flat ground shows no noise, m.
+const MIN_HEIGHT_RANGE: f64 = 0.1;
+/// Overlap of neighboring rectangles, which hides the seams between them, pixels.
+const OVERLAP: f64 = 0.4;
+/// Segments of the ground's profile.
+const PROFILE: u32 = 240;
+/// A motion shorter than this has no direction to be viewed along, m.
+const MIN_LENGTH: f64 = 0.05;
+/// Histories up to this length are drawn with a dot for each iteration.
+const MAX_DOTS: usize = 60;
+/// Names of failed checks in the heading.
+const MAX_NAMES: usize = 3;
+/// Style of the base's path.
 const BASE: &str = "stroke=\"#111\" stroke-width=\"2.4\"";
 
 /// An SVG drawing of a plan.
@@ -30,22 +44,23 @@ fn heading(svg: &mut Svg, plan: &Plan) {
     svg.text([70.0, 32.0], &title, Font { size: 19.0, ..Font::TITLE });
     let failed: Vec<&str> =
         meta.checks.iter().filter(|row| !row.passed).map(|row| row.name.as_str()).collect();
+    let names = failed[..failed.len().min(MAX_NAMES)].join(", ");
     let checks = match (meta.checks.len(), failed.len()) {
         (0, _) => "not checked".to_owned(),
-        (n, 0) => format!("all {n} checks hold"),
-        (n, 1..=3) => format!("{} of {n} checks fail: {}", failed.len(), failed.join(", ")),
-        (n, _) => format!("{} of {n} checks fail: {}, …", failed.len(), failed[..3].join(", ")),
+        (_, 0) => check_counts(&meta.checks),
+        (_, 1..=MAX_NAMES) => format!("{}: {names}", check_counts(&meta.checks)),
+        _ => format!("{}: {names}, …", check_counts(&meta.checks)),
     };
     let solver = &meta.solver;
-    let words = format!(
+    let text = format!(
         "{}; {} iterations, {} s, largest violation {}; {checks}",
         solver.status,
         solver.iterations,
         number(solver.seconds.total),
         number(solver.max_violation)
     );
-    let colour = if solver.success && failed.is_empty() { "#1b6e44" } else { "#b3261e" };
-    svg.text([70.0, 56.0], &words, Font { size: 13.5, anchor: "start", bold: false, colour });
+    let color = if solver.success && failed.is_empty() { "#1b6e44" } else { "#b3261e" };
+    svg.text([70.0, 56.0], &text, Font { size: 13.5, anchor: "start", bold: false, color });
     // One legend for all panels.
     let mut x = 700.0;
     svg.line([x, 76.0], [x + 24.0, 76.0], BASE);
@@ -58,15 +73,16 @@ fn heading(svg: &mut Svg, plan: &Plan) {
 }
 
 fn stroke(foot: usize, width: f64) -> String {
-    format!("stroke=\"{}\" stroke-width=\"{width}\"", foot_colour(foot))
+    format!("stroke=\"{}\" stroke-width=\"{width}\"", foot_color(foot))
 }
 
 fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
     let visited = |axis: usize| plan.base_position.iter().chain(&plan.foot_position).map(move |p| p[axis]);
     let axes = Axes::equal(frame, range(visited(0), 0.12), range(visited(1), 0.12));
+    let heights = raster(&axes, &plan.ground);
     svg.clipped(frame, |svg| {
         svg.rect(frame, "fill=\"#f4f4f4\"");
-        shading(svg, &axes, &plan.ground);
+        shading(svg, frame, &heights);
     });
     axes.draw(svg, "From above, ground shaded by height", "x, m", "y, m");
     svg.clipped(frame, |svg| {
@@ -76,7 +92,7 @@ fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
         }
         for e in 0..plan.foot_names.len() {
             for (_, [x, y, _]) in footholds(plan, e) {
-                let style = format!("fill=\"{}\" stroke=\"#fff\" stroke-width=\"0.8\"", foot_colour(e));
+                let style = format!("fill=\"{}\" stroke=\"#fff\" stroke-width=\"0.8\"", foot_color(e));
                 svg.circle(axes.at(x, y), 4.0, &style);
             }
         }
@@ -86,22 +102,22 @@ fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
         svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
         svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
     });
-    height_scale(svg, plan, &axes);
+    height_scale(svg, frame, &heights);
 }
 
-/// Samples of one foot: index and position.
+/// Index and position of each sample of one foot.
 fn foot_samples(plan: &Plan, foot: usize) -> impl Iterator<Item = (usize, [f64; 3])> {
     plan.foot_position.iter().skip(foot).step_by(plan.foot_names.len()).copied().enumerate()
 }
 
-/// The sample and place of every touch-down of a foot, the first stance included.
+/// Sample and position of every touch-down of a foot; the first stance counts as one.
 fn footholds(plan: &Plan, foot: usize) -> impl Iterator<Item = (usize, [f64; 3])> {
     let feet = plan.foot_names.len();
     let stands = move |n: usize| plan.foot_contact[n * feet + foot];
     foot_samples(plan, foot).filter(move |&(n, _)| stands(n) && (n == 0 || !stands(n - 1)))
 }
 
-/// The height of the grid at a place, bilinear; none beyond it.
+/// Bilinear interpolation of the ground's height, m; none outside the grid.
 fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
     let (u, v) = ((x - ground.origin[0]) / ground.spacing[0], (y - ground.origin[1]) / ground.spacing[1]);
     let (most_u, most_v) = ((ground.columns - 1) as f64, (ground.rows - 1) as f64);
@@ -116,85 +132,77 @@ fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
     Some(low * (1.0 - b) + high * b)
 }
 
-/// Heights over the frame: `RASTER` × `RASTER` cell centres, row by row from the top.
+/// Heights over the frame at the centers of `RASTER` × `RASTER` cells, row by row from the top.
 fn raster(axes: &Axes, ground: &GroundGrid) -> Vec<Option<f64>> {
     let at = |[a, b]: [f64; 2], i: usize| a + (b - a) * (i as f64 + 0.5) / RASTER as f64;
     let rows = (0..RASTER).rev().flat_map(|j| (0..RASTER).map(move |i| (i, j)));
     rows.map(|(i, j)| height(ground, at(axes.x, i), at(axes.y, j))).collect()
 }
 
-/// Least and greatest height within the frame; at least 10 cm apart, so that flat ground shows no noise.
+/// Smallest and largest height within the frame, at least [`MIN_HEIGHT_RANGE`] apart.
 fn height_range(raster: &[Option<f64>]) -> [f64; 2] {
     let [low, high] = range(raster.iter().flatten().copied(), 0.0);
-    if high - low >= 0.1 { [low, high] } else { [0.5 * (low + high) - 0.05, 0.5 * (low + high) + 0.05] }
+    if high - low >= MIN_HEIGHT_RANGE {
+        return [low, high];
+    }
+    let middle = 0.5 * (low + high);
+    [middle - 0.5 * MIN_HEIGHT_RANGE, middle + 0.5 * MIN_HEIGHT_RANGE]
 }
 
-/// Height as bands of colour: cells of one level are drawn as one strip.
-fn shading(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
-    let heights = raster(axes, ground);
-    let [low, high] = height_range(&heights);
-    let level =
-        |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1));
-    let [left, top, width, tall] = axes.frame;
-    let (cell_w, cell_h) = (width / RASTER as f64, tall / RASTER as f64);
+/// Draws height as bands of color; neighboring cells of one band are one rectangle.
+fn shading(svg: &mut Svg, [left, top, width, height]: [f64; 4], heights: &[Option<f64>]) {
+    let [low, high] = height_range(heights);
+    let band =
+        |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * BANDS as f64) as usize).min(BANDS - 1));
+    let (cell_width, cell_height) = (width / RASTER as f64, height / RASTER as f64);
     for (j, row) in heights.chunks(RASTER).enumerate() {
-        let mut i = 0;
-        while i < RASTER {
-            let here = level(&row[i]);
-            let begin = i;
-            while i < RASTER && level(&row[i]) == here {
-                i += 1;
-            }
-            if let Some(here) = here {
-                // A hair larger than the cell, against seams.
+        let mut begin = 0;
+        for cells in row.chunk_by(|a, b| band(a) == band(b)) {
+            if let Some(band) = band(&cells[0]) {
                 let strip = [
-                    left + begin as f64 * cell_w,
-                    top + j as f64 * cell_h,
-                    (i - begin) as f64 * cell_w + 0.4,
-                    cell_h + 0.4,
+                    left + begin as f64 * cell_width,
+                    top + j as f64 * cell_height,
+                    cells.len() as f64 * cell_width + OVERLAP,
+                    cell_height + OVERLAP,
                 ];
-                svg.rect(strip, &format!("fill=\"{}\"", ground_colour((here as f64 + 0.5) / LEVELS as f64)));
+                svg.rect(strip, &band_style(band));
             }
+            begin += cells.len();
         }
     }
 }
 
 /// From pale blue (low) over sand to brown (high), light enough for paths to stand out.
-fn ground_colour(share: f64) -> String {
-    let stops = [[206.0, 222.0, 234.0], [243.0, 238.0, 222.0], [196.0, 160.0, 118.0]];
-    let (from, to, a) = if share < 0.5 { (0, 1, 2.0 * share) } else { (1, 2, 2.0 * share - 1.0) };
-    let mixed: [u8; 3] = std::array::from_fn(|c| (stops[from][c] * (1.0 - a) + stops[to][c] * a) as u8);
-    format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
+fn band_style(band: usize) -> String {
+    const STOPS: [[f64; 3]; 3] = [[206.0, 222.0, 234.0], [243.0, 238.0, 222.0], [196.0, 160.0, 118.0]];
+    format!("fill=\"{}\"", ramp(&STOPS, (band as f64 + 0.5) / BANDS as f64))
 }
 
-/// What the colours mean, at the right border of the view from above.
-fn height_scale(svg: &mut Svg, plan: &Plan, axes: &Axes) {
-    let [low, high] = height_range(&raster(axes, &plan.ground));
-    let [left, top, width, tall] = axes.frame;
-    let (x, step) = (left + width + 8.0, tall / LEVELS as f64);
-    for i in 0..LEVELS {
-        let y = top + tall - (i + 1) as f64 * step;
-        svg.rect(
-            [x, y, 12.0, step + 0.4],
-            &format!("fill=\"{}\"", ground_colour((i as f64 + 0.5) / LEVELS as f64)),
-        );
+/// The scale of heights, right of the view from above.
+fn height_scale(svg: &mut Svg, [left, top, width, height]: [f64; 4], heights: &[Option<f64>]) {
+    let [low, high] = height_range(heights);
+    let (x, step) = (left + width + 8.0, height / BANDS as f64);
+    for band in 0..BANDS {
+        let y = top + height - (band + 1) as f64 * step;
+        svg.rect([x, y, 12.0, step + OVERLAP], &band_style(band));
     }
     let font = Font { size: 11.0, ..Font::TICK }.anchored("start");
     svg.text([x, top - 6.0], &format!("{high:.2} m"), font);
-    svg.text([x, top + tall + 15.0], &format!("{low:.2} m"), font);
+    svg.text([x, top + height + 15.0], &format!("{low:.2} m"), font);
 }
 
 fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
-    // Distance along the way from start to end; along x when there is no way.
+    // The horizontal axis runs from start to goal, or along x when they coincide.
     let [a, b] = [plan.base_position[0], plan.base_position[plan.t.len() - 1]];
     let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-    let direction = if length > 0.05 { [(b[0] - a[0]) / length, (b[1] - a[1]) / length] } else { [1.0, 0.0] };
+    let direction =
+        if length > MIN_LENGTH { [(b[0] - a[0]) / length, (b[1] - a[1]) / length] } else { [1.0, 0.0] };
     let along = move |p: &[f64; 3]| (p[0] - a[0]) * direction[0] + (p[1] - a[1]) * direction[1];
 
     let x = range(plan.base_position.iter().chain(&plan.foot_position).map(along), 0.04);
-    // The ground on the straight line from start to end.
-    let profile: Vec<[f64; 2]> = (0..=240)
-        .map(|i| x[0] + (x[1] - x[0]) * f64::from(i) / 240.0)
+    // The ground on the straight line from start to goal.
+    let profile: Vec<[f64; 2]> = (0..=PROFILE)
+        .map(|i| x[0] + (x[1] - x[0]) * f64::from(i) / f64::from(PROFILE))
         .filter_map(|s| Some([s, height(&plan.ground, a[0] + s * direction[0], a[1] + s * direction[1])?]))
         .collect();
     let heights = plan.base_position.iter().chain(&plan.foot_position).map(|p| p[2]);
@@ -209,8 +217,8 @@ fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
     });
     axes.draw(
         svg,
-        "From the side, ground on the straight line from start to end",
-        "along the way, m",
+        "From the side, ground on the straight line from start to goal",
+        "distance from the start, m",
         "z, m",
     );
     svg.clipped(frame, |svg| {
@@ -242,10 +250,7 @@ fn contacts(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
             }
             if n > begin {
                 let [[x1, _], [x2, _]] = [plan.t[begin], plan.t[n - 1]].map(|t| axes.at(t, 0.0));
-                svg.rect(
-                    [x1, top + 0.18 * bar, x2 - x1, 0.64 * bar],
-                    &format!("fill=\"{}\"", foot_colour(e)),
-                );
+                svg.rect([x1, top + 0.18 * bar, x2 - x1, 0.64 * bar], &format!("fill=\"{}\"", foot_color(e)));
             }
             n += 1;
         }
@@ -264,7 +269,7 @@ fn normal_forces(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
     let weight = robot.mass * robot.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     let [low, high] = range(along.iter().copied().chain([weight]), 0.05);
     let axes = Axes::new(frame, time_range(plan), [low.min(0.0), high]);
-    axes.draw(svg, "Normal force by foot; dashed: the robot's weight", "time, s", "force, N");
+    axes.draw(svg, "Normal force of each foot; dashed: the robot's weight", "time, s", "force, N");
     svg.clipped(frame, |svg| {
         let ends = time_range(plan).map(|t| axes.at(t, weight));
         svg.line(ends[0], ends[1], "stroke=\"#555\" stroke-dasharray=\"6 4\"");
@@ -281,13 +286,11 @@ fn convergence(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
     axes.draw(svg, "Largest violation by iteration", "iteration", "units of the NLP");
     if violation.is_empty() {
         let middle = [frame[0] + 0.5 * frame[2], frame[1] + 0.5 * frame[3]];
-        return svg.text(middle, "no history in the plan", Font::LABEL);
+        return svg.text(middle, "the plan holds no history", Font::LABEL);
     }
-    // A violation of zero has no logarithm; it is drawn at the bottom.
-    let floor = 10f64.powf(axes.y[0]);
-    let points = || violation.iter().enumerate().map(|(i, v)| axes.at(i as f64, v.max(floor)));
+    let points = || violation.iter().enumerate().map(|(i, v)| axes.at(i as f64, *v));
     svg.clipped(frame, |svg| svg.polyline(points(), "stroke=\"#2166ac\" stroke-width=\"1.6\""));
-    if violation.len() <= 60 {
+    if violation.len() <= MAX_DOTS {
         points().for_each(|point| svg.circle(point, 2.6, "fill=\"#2166ac\""));
     }
 }

@@ -2,15 +2,12 @@
 
 use std::fmt::{Display, Write};
 
-/// Colours that stay apart for most people, also when printed; one per foot, again from the start after the last.
-const FEET: [&str; 6] = ["#c8352c", "#2166ac", "#e08214", "#1b8a5a", "#7b3fa0", "#6b6b6b"];
+/// Points of a polyline closer than this to the last one drawn are left out, pixels.
+const MIN_STEP: f64 = 0.4;
+/// Average width of a character, in font sizes.
+const CHARACTER_WIDTH: f64 = 0.62;
 
-/// The colour of a foot.
-pub(crate) fn foot_colour(foot: usize) -> &'static str {
-    FEET[foot % FEET.len()]
-}
-
-/// A drawing in the making; lengths are pixels, y points down.
+/// A drawing under construction; lengths are in pixels, y points down.
 pub(crate) struct Svg {
     width: f64,
     height: f64,
@@ -18,20 +15,21 @@ pub(crate) struct Svg {
     clips: usize,
 }
 
-/// How a text is set.
+/// Size, alignment, weight and color of a text.
 #[derive(Clone, Copy)]
 pub(crate) struct Font {
+    /// Pixels.
     pub size: f64,
     /// `start`, `middle` or `end`.
     pub anchor: &'static str,
     pub bold: bool,
-    pub colour: &'static str,
+    pub color: &'static str,
 }
 
 impl Font {
-    pub const TICK: Font = Font { size: 12.0, anchor: "middle", bold: false, colour: "#444" };
-    pub const LABEL: Font = Font { size: 13.0, anchor: "middle", bold: false, colour: "#222" };
-    pub const TITLE: Font = Font { size: 14.5, anchor: "start", bold: true, colour: "#111" };
+    pub const TICK: Font = Font { size: 12.0, anchor: "middle", bold: false, color: "#444" };
+    pub const LABEL: Font = Font { size: 13.0, anchor: "middle", bold: false, color: "#222" };
+    pub const TITLE: Font = Font { size: 14.5, anchor: "start", bold: true, color: "#111" };
 
     pub const fn anchored(self, anchor: &'static str) -> Font {
         Font { anchor, ..self }
@@ -53,7 +51,7 @@ impl Svg {
         )
     }
 
-    /// One element from its name and attributes.
+    /// Adds one element, given its name and attributes.
     fn element(&mut self, element: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.body, "<{element}/>");
@@ -65,7 +63,7 @@ impl Svg {
         ));
     }
 
-    /// Many rectangles of one look as one element.
+    /// Many rectangles of one style, as one element.
     pub fn rects(&mut self, all: impl IntoIterator<Item = [f64; 4]>, style: &str) {
         let mut path = String::new();
         for [x, y, w, h] in all {
@@ -84,13 +82,13 @@ impl Svg {
         ));
     }
 
-    /// A line through points; points too close to be told apart are left out.
+    /// A line through points; of points too close to tell apart only one is drawn.
     pub fn polyline(&mut self, points: impl IntoIterator<Item = [f64; 2]>, style: &str) {
         let mut text = String::new();
         let mut last: Option<[f64; 2]> = None;
         let mut pending = None;
         for [x, y] in points {
-            if last.is_some_and(|[a, b]| (x - a).hypot(y - b) < 0.4) {
+            if last.is_some_and(|[a, b]| (x - a).hypot(y - b) < MIN_STEP) {
                 pending = Some([x, y]);
                 continue;
             }
@@ -113,13 +111,14 @@ impl Svg {
         self.element(format_args!("polygon points=\"{}\" {style}", text.join(" ")));
     }
 
+    /// A text at its anchor.
     pub fn text(&mut self, at: [f64; 2], text: &str, font: Font) {
-        self.turned_text(at, text, font, 0.0);
+        self.rotated_text(at, text, font, 0.0);
     }
 
-    /// A text that stays readable over what is drawn already.
+    /// A text on a pale background, readable on top of other elements.
     pub fn label(&mut self, [x, y]: [f64; 2], text: &str, font: Font) {
-        let width = 0.62 * font.size * text.chars().count() as f64 + 4.0;
+        let width = CHARACTER_WIDTH * font.size * text.chars().count() as f64 + 4.0;
         let left = match font.anchor {
             "start" => x - 2.0,
             "end" => x - width + 2.0,
@@ -130,11 +129,11 @@ impl Svg {
         self.text([x, y], text, font);
     }
 
-    /// A text turned by an angle in degrees about its anchor.
-    pub fn turned_text(&mut self, [x, y]: [f64; 2], text: &str, font: Font, angle: f64) {
-        let Font { size, anchor, bold, colour } = font;
+    /// A text rotated about its anchor by an angle, degrees clockwise.
+    pub fn rotated_text(&mut self, [x, y]: [f64; 2], text: &str, font: Font, angle: f64) {
+        let Font { size, anchor, bold, color } = font;
         let weight = if bold { " font-weight=\"bold\"" } else { "" };
-        let turn = if angle == 0.0 {
+        let rotation = if angle == 0.0 {
             String::new()
         } else {
             format!(" transform=\"rotate({angle} {x:.1} {y:.1})\"")
@@ -142,11 +141,11 @@ impl Svg {
         let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
         let _ = writeln!(
             self.body,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{weight}{turn}>{text}</text>"
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{color}\"{weight}{rotation}>{text}</text>"
         );
     }
 
-    /// Draws within a rectangle only.
+    /// Clips what `draw` draws to a rectangle.
     pub fn clipped(&mut self, [x, y, w, h]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         self.clips += 1;
         let id = self.clips;

@@ -1,4 +1,4 @@
-//! Aligned tables for the terminal.
+//! Aligned tables for the terminal, and how numbers are written in them.
 
 use crate::check::CheckReport;
 use crate::plan::CheckRow;
@@ -6,7 +6,7 @@ use crate::planner::derivatives::DerivativeError;
 use crate::planner::violation::BlockViolation;
 use crate::warp::{Distribution, MapReport};
 
-/// A table with a header; columns of numbers are set flush right.
+/// A table with a header and right-aligned columns of numbers.
 pub struct Table {
     header: Vec<String>,
     right: Vec<bool>,
@@ -14,7 +14,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows; a column name that starts with `>` is set flush right.
+    /// A table without rows; a column whose name starts with `>` is right-aligned.
     pub fn new(columns: &[&str]) -> Self {
         Self {
             header: columns.iter().map(|c| c.trim_start_matches('>').to_owned()).collect(),
@@ -30,7 +30,7 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// The lines; `paint` may colour a cell that is already padded, given its row and column.
+    /// The lines; `paint` may color a padded cell, given its row and column.
     pub fn lines(&self, paint: impl Fn(usize, usize, String) -> String) -> Vec<String> {
         let width = |c: usize| {
             let cells = self.rows.iter().map(|row| row[c].chars().count());
@@ -50,8 +50,8 @@ impl Table {
     }
 }
 
-/// Laws, values, limits and verdicts, with the figures below.
-pub fn check_table(report: &CheckReport, colour: bool) -> String {
+/// Value, limit and verdict of each law, followed by the figures, which have no limit.
+pub fn check_table(report: &CheckReport, color: bool) -> String {
     let mut table = Table::new(&["check", ">value", ">limit", "unit", "verdict", "worst at"]);
     for row in &report.rows {
         let verdict = if row.passed { "ok" } else { "FAILS" };
@@ -74,17 +74,26 @@ pub fn check_table(report: &CheckReport, colour: bool) -> String {
             place(row),
         ]);
     }
-    let paint =
-        |r: usize, c: usize, text: String| match (colour && c == 4, report.rows.get(r).map(|row| row.passed))
-        {
-            (true, Some(true)) => format!("\x1b[32m{text}\x1b[0m"),
-            (true, Some(false)) => format!("\x1b[1;31m{text}\x1b[0m"),
-            _ => text,
-        };
+    let paint = |r: usize, c: usize, text: String| match (
+        color && c == 4,
+        report.rows.get(r).map(|row| row.passed),
+    ) {
+        (true, Some(true)) => format!("\x1b[32m{text}\x1b[0m"),
+        (true, Some(false)) => format!("\x1b[1;31m{text}\x1b[0m"),
+        _ => text,
+    };
     table.lines(paint).join("\n")
 }
 
-/// The largest violation of every block of the NLP, in its units.
+/// "all 30 checks hold" or "2 of 30 checks fail".
+pub fn check_counts(rows: &[CheckRow]) -> String {
+    match rows.iter().filter(|row| !row.passed).count() {
+        0 => format!("all {} checks hold", rows.len()),
+        failed => format!("{failed} of {} checks fail", rows.len()),
+    }
+}
+
+/// The largest violation of every constraint, units of the NLP.
 pub fn violation_table(violations: &[BlockViolation], tolerance: f64) -> String {
     let mut table = Table::new(&["constraint", ">rows", ">largest", "", "worst at"]);
     for block in violations {
@@ -108,7 +117,7 @@ pub fn violation_table(violations: &[BlockViolation], tolerance: f64) -> String 
     table.lines(|_, _, text| text).join("\n")
 }
 
-/// Analytic derivatives against differences, by block.
+/// Errors of the analytic derivatives against central differences, by block.
 pub fn derivative_table(errors: &[DerivativeError]) -> String {
     let mut table = Table::new(&["derivatives of", ">largest error", ">missing", "at"]);
     for error in errors {
@@ -122,19 +131,19 @@ pub fn derivative_table(errors: &[DerivativeError]) -> String {
     table.lines(|_, _, text| text).join("\n")
 }
 
-/// What a map is like.
+/// Size, convergence and quality of a map.
 pub fn map_table(report: &MapReport, cached: bool) -> String {
     let [x, y, z] = report.cells;
-    let origin = if cached { "from the cache; built " } else { "" };
-    let ending = if report.converged { "converged" } else { "did NOT converge" };
+    let origin = if cached { "from the cache, built" } else { "built" };
+    let ending = if report.converged { "converged" } else { "NOT CONVERGED" };
     let folded = match report.inverted_points {
-        0 => "nowhere folded".to_owned(),
+        0 => "no folds".to_owned(),
         n => format!("FOLDED at {n} points"),
     };
     let method = report.method.name();
     let head = format!(
-        "Map by {method} of {x}×{y}×{z} cells, {origin}in {} s: {ending} after {} iterations, {folded}\n\
-         Distance from the terrain: {} mm rms, {} mm at most; least determinant {}; scale at the ground {} to {}\n",
+        "Map by {method}, {x}×{y}×{z} cells, {origin} in {} s: {ending} after {} iterations, {folded}\n\
+         Distance from the terrain: {} mm rms, {} mm max; smallest determinant {}; scale at the ground {} to {}\n",
         number(report.seconds),
         report.iterations,
         number(1e3 * report.misfit_rms),
@@ -143,7 +152,7 @@ pub fn map_table(report: &MapReport, cached: bool) -> String {
         number(report.scale[0]),
         number(report.scale[1]),
     );
-    let mut table = Table::new(&["", ">mean", ">median", ">95 %", ">most", "unit"]);
+    let mut table = Table::new(&["", ">mean", ">median", ">95 %", ">max", "unit"]);
     let mut row = |name: &str, d: &Distribution, factor: f64, unit: &str| {
         let figures = [d.mean, d.median, d.p95, d.max].map(|v| number(factor * v));
         table.row([name.to_owned()].into_iter().chain(figures).chain([unit.to_owned()]));
@@ -151,17 +160,15 @@ pub fn map_table(report: &MapReport, cached: bool) -> String {
     row("conformal error at the ground", &report.conformal_ground, 100.0, "%");
     row("… up to 0.5 m above", &report.conformal_near_ground, 100.0, "%");
     row("… at the torso, 0.4 to 0.6 m above", &report.conformal_torso, 100.0, "%");
-    row("J z to the terrain's normal", &report.normal_angle, 1.0, "°");
-    let rejected: String = report
-        .rejected
-        .iter()
-        .map(|map| format!("Not taken: {}: {}\n", map.method.name(), map.why))
-        .collect();
+    row("angle of J z to the terrain's normal", &report.normal_angle, 1.0, "°");
+    let rejected: String =
+        report.rejected.iter().map(|map| format!("Rejected: {}: {}\n", map.method.name(), map.why)).collect();
     format!("{rejected}{head}{}", table.lines(|_, _, text| text).join("\n"))
 }
 
+/// Time and foot at which a check is worst.
 fn place(row: &CheckRow) -> String {
-    // Where nothing is violated there is no worst place worth a word.
+    // A law that holds exactly has no worst place.
     if row.value == 0.0 {
         return String::new();
     }
@@ -169,7 +176,7 @@ fn place(row: &CheckRow) -> String {
     [time, row.foot.clone()].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
-/// A number to three figures, in scientific notation where that is shorter.
+/// A number with three significant digits, in scientific notation below 10⁻³ and from 10⁵ on.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {
@@ -189,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_three_figures() {
+    fn numbers_have_three_digits() {
         for (value, text) in [
             (0.0, "0"),
             (0.012345, "0.0123"),

@@ -1,4 +1,4 @@
-//! Live progress on standard error: one line that changes at a terminal, now and then a plain line elsewhere.
+//! Progress on standard error: a line that is updated in place at a terminal, a new line every few seconds elsewhere.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -7,32 +7,36 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::pipeline::Event;
 
-/// Between two plain lines of the same stage.
-const PLAIN_INTERVAL: Duration = Duration::from_secs(5);
+/// Least time between two lines of the same stage where they are not updated in place.
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
+/// Time between two frames of the spinner.
+const SPINNER_INTERVAL: Duration = Duration::from_millis(120);
 
-/// Where progress is shown.
-pub(super) struct Progress {
-    line: Option<ProgressBar>,
+/// Shows progress.
+pub(super) struct ProgressLine {
+    /// The line that is updated in place; none when quiet or not at a terminal.
+    bar: Option<ProgressBar>,
     quiet: bool,
     stage: String,
-    shown: Option<Instant>,
+    /// When the last line was written.
+    written: Option<Instant>,
 }
 
-impl Progress {
+impl ProgressLine {
     pub fn new(quiet: bool) -> Self {
-        let line = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let line = ProgressBar::new_spinner();
-            // The template is a constant; should it be wrong, the default one does.
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new_spinner();
+            // The template is constant and valid; without it, indicatif's own is used.
             if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed:>4} {msg}") {
-                line.set_style(style);
+                bar.set_style(style);
             }
-            line.enable_steady_tick(Duration::from_millis(120));
-            line
+            bar.enable_steady_tick(SPINNER_INTERVAL);
+            bar
         });
-        Self { line, quiet, stage: String::new(), shown: None }
+        Self { bar, quiet, stage: String::new(), written: None }
     }
 
-    /// Shows what is going on.
+    /// Shows an event of the pipeline.
     pub fn show(&mut self, event: &Event) {
         match event {
             Event::Step(step) => self.update(&step.to_string(), ""),
@@ -56,28 +60,28 @@ impl Progress {
         }
     }
 
-    /// Shows where a stage stands.
-    pub(super) fn update(&mut self, stage: &str, detail: &str) {
+    /// Shows a stage and how far it is.
+    pub fn update(&mut self, stage: &str, detail: &str) {
         if self.quiet {
             return;
         }
         let text = if detail.is_empty() { stage.to_owned() } else { format!("{stage}: {detail}") };
-        if let Some(line) = &self.line {
-            return line.set_message(text);
+        if let Some(bar) = &self.bar {
+            return bar.set_message(text);
         }
-        let due = self.shown.is_none_or(|shown| shown.elapsed() >= PLAIN_INTERVAL);
+        let due = self.written.is_none_or(|written| written.elapsed() >= LINE_INTERVAL);
         if due || self.stage != stage {
             let _ = writeln!(std::io::stderr().lock(), "{text}");
             self.stage = stage.to_owned();
-            self.shown = Some(Instant::now());
+            self.written = Some(Instant::now());
         }
     }
 
-    /// Says something that stays.
+    /// Writes a message that stays on the screen.
     pub fn note(&self, text: &str) {
-        match &self.line {
+        match &self.bar {
             _ if self.quiet => {}
-            Some(line) => line.println(text),
+            Some(bar) => bar.println(text),
             None => {
                 let _ = writeln!(std::io::stderr().lock(), "{text}");
             }
@@ -85,10 +89,10 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for ProgressLine {
     fn drop(&mut self) {
-        if let Some(line) = &self.line {
-            line.finish_and_clear();
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
         }
     }
 }
