@@ -78,6 +78,7 @@
 //! m g · 1 m, so that a tolerance means about the same for every row.
 
 pub mod bench;
+mod bspline;
 pub mod check;
 pub mod cli;
 pub mod constraints;

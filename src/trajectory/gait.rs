@@ -1,6 +1,5 @@
-//! Which foot stands when. Nominal switches lie on the grid of samples, so that piecewise linear forces have their kinks
-//! where the base's acceleration has its own. With `gait.optimize_durations` they may leave it, each within a room of its
-//! own; see [`super::switches`].
+//! Which foot stands when. Nominal switches are on samples, so that the piecewise linear forces and the base's acceleration have
+//! their kinks at the same times. With `gait.optimize_durations` each switch may move within some room; see [`super::switches`].
 
 use super::phase::{Stance, Swing};
 use super::switches;
@@ -8,34 +7,34 @@ use crate::robot::Robot;
 use crate::scenario::{GaitKind, Scenario};
 use crate::{Error, Result};
 
-/// Standing at the start and at the end, s.
+/// Least time of standing at the start and at the end, s, in which the base accelerates and stops.
 const STAND: f64 = 0.3;
+/// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
+const CYCLE: f64 = 1.0;
+/// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
+const SHORTEST_PHASE: f64 = 2.0;
 
-/// Swings by foot, in order of time.
+/// The swings of each foot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gait {
-    /// Intervals of the sample grid.
+    /// Number of time steps.
     pub intervals: usize,
-    /// By foot.
+    /// `swings[foot]`, in order of time.
     pub swings: Vec<Vec<Swing>>,
 }
-
-/// Length of a gait's cycle, s, where neither scenario nor robot name one.
-const CYCLE: f64 = 1.0;
 
 impl Gait {
     /// The gait of a scenario for its robot.
     ///
     /// # Errors
-    /// For a gait that the robot, the horizon or the time step does not allow, or whose durations cannot be optimized.
+    /// If the gait does not fit the robot, the horizon or the time step, or its durations cannot be optimized.
     pub fn of(scenario: &Scenario, robot: &Robot) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
     }
 
-    /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom); `cycle` is the
-    /// length of a cycle, s, where the scenario names none.
-    pub fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
+    /// The gait of a scenario for feet with these names. `cycle` is the duration of a cycle, s, if the scenario does not specify it.
+    fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
         let step = scenario.time_step;
         let intervals = (scenario.horizon / step).round() as usize;
         let gait = &scenario.gait;
@@ -58,7 +57,7 @@ impl Gait {
         Ok(Self { intervals, swings })
     }
 
-    /// The stances of a foot, in order of time: one more than its swings.
+    /// The stances of a foot in order of time, one more than its swings.
     pub fn stances(&self, foot: usize) -> Vec<Stance> {
         let swings = &self.swings[foot];
         (0..=swings.len())
@@ -68,17 +67,12 @@ impl Gait {
             })
             .collect()
     }
-
-    /// The swing that sample `k` lies strictly inside of, or may lie inside of, if any.
-    pub fn swing_at(&self, foot: usize, k: usize) -> Option<usize> {
-        self.swings[foot].iter().position(|s| s.span()[0] < k as f64 && (k as f64) < s.span()[1])
-    }
 }
 
-/// Lift-off of each foot as a share of the cycle, and the usual duty factor.
+/// The lift-off of each foot, as a fraction of the cycle, and the default duty factor.
 fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
     let (table, duty): ([f64; 4], f64) = match kind {
-        // LH, LF, RH, RF, one foot at a time.
+        // One foot at a time: LH, LF, RH, RF.
         GaitKind::Walk => ([0.25, 0.75, 0.0, 0.5], 0.75),
         GaitKind::Trot => ([0.0, 0.5, 0.5, 0.0], 0.6),
         GaitKind::Pace => ([0.0, 0.5, 0.0, 0.5], 0.6),
@@ -91,7 +85,7 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
         .map(|name| {
             order.iter().position(|o| o == name).map(|i| table[i]).ok_or_else(|| {
                 Error::input(format!(
-                    "gait.kind: the shipped gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
+                    "gait.kind: the built-in gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
                 ))
             })
         })
@@ -99,21 +93,21 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
     Ok((offsets, duty))
 }
 
-/// As many whole cycles as fit between standing at the start and at the end; what is left is standing too.
+/// As many whole cycles as fit into the horizon with standing at both ends. The remaining time is divided between the ends.
 fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Result<Vec<Vec<Swing>>> {
     let swing = ((1.0 - duty) * cycle / step).round();
-    if swing < 2.0 {
+    if swing < SHORTEST_PHASE {
         return Err(Error::input(format!(
             "gait: a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, lower the duty or the time_step",
             (1.0 - duty) * cycle
         )));
     }
     let last = offsets.iter().fold(0.0, |a: f64, &b| a.max(b)) + (1.0 - duty);
-    // n cycles take (n - 1 + last) cycle lengths.
+    // n cycles take n − 1 + last times the duration of one; the summand of 1e-9 absorbs rounding.
     let cycles = ((horizon - 2.0 * STAND) / cycle - last + 1.0 + 1e-9).floor();
     if cycles < 1.0 {
         return Err(Error::input(format!(
-            "gait: not one cycle of {cycle} s fits into the horizon of {horizon} s with {STAND} s of standing at both ends; lengthen the horizon or shorten gait.cycle"
+            "gait: no cycle of {cycle} s fits into the horizon of {horizon} s with {STAND} s of standing at both ends; lengthen the horizon or shorten gait.cycle"
         )));
     }
     let begin = (horizon - (cycles - 1.0 + last) * cycle) / 2.0;
@@ -130,50 +124,51 @@ fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Re
         .collect())
 }
 
-/// Phase tables: stance and swing durations in turn, stance first and last.
+/// The gait of tables of phase durations, s, one for each foot.
 fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize) -> Result<Vec<Vec<Swing>>> {
     let phases = phases.ok_or_else(|| {
         Error::input("gait.phases: kind = \"custom\" needs a table of phase durations for each foot, stance first, in s")
     })?;
     if phases.len() != feet {
         return Err(Error::input(format!(
-            "gait.phases: {} tables given, but the robot has {feet} feet",
+            "gait.phases: there are {} tables, but the robot has {feet} feet",
             phases.len()
         )));
     }
-    phases
-        .iter()
-        .enumerate()
-        .map(|(foot, durations)| {
-            if durations.len() % 2 == 0 {
-                return Err(Error::input(format!(
-                    "gait.phases[{foot}]: {} durations; an odd number is needed, for a foot stands at the start and at the end",
-                    durations.len()
-                )));
-            }
-            let mut edges = vec![0.0];
-            let mut time = 0.0;
-            for d in durations {
-                time += d;
-                edges.push((time / step).round());
-            }
-            if edges[durations.len()] != intervals as f64 {
-                return Err(Error::input(format!(
-                    "gait.phases[{foot}]: the durations sum to {time} s, but the horizon is {} s",
-                    intervals as f64 * step
-                )));
-            }
-            for (j, pair) in edges.windows(2).enumerate() {
-                if pair[1] < pair[0] + 2.0 {
-                    return Err(Error::input(format!(
-                        "gait.phases[{foot}][{j}]: {} s is shorter than two time steps of {step} s",
-                        durations[j]
-                    )));
-                }
-            }
-            Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
-        })
-        .collect()
+    let swings = |(foot, durations): (usize, &Vec<f64>)| {
+        custom_swings(durations, step, intervals)
+            .map_err(|what| Error::input(format!("gait.phases[{foot}]{what}")))
+    };
+    phases.iter().enumerate().map(swings).collect()
+}
+
+/// The swings of a foot from the durations of its stances and swings in turn, s, stance first and last.
+///
+/// # Errors
+/// The part of the message after `gait.phases[foot]`.
+fn custom_swings(durations: &[f64], step: f64, intervals: usize) -> std::result::Result<Vec<Swing>, String> {
+    if durations.len() % 2 == 0 {
+        return Err(format!(
+            ": {} durations; the number must be odd because a foot stands at the start and at the end",
+            durations.len()
+        ));
+    }
+    let mut switches = vec![0.0];
+    let mut time = 0.0;
+    for duration in durations {
+        time += duration;
+        switches.push((time / step).round());
+    }
+    if switches[durations.len()] != intervals as f64 {
+        let horizon = intervals as f64 * step;
+        return Err(format!(": the durations sum to {time} s, but the horizon is {horizon} s"));
+    }
+    for (j, pair) in switches.windows(2).enumerate() {
+        if pair[1] < pair[0] + SHORTEST_PHASE {
+            return Err(format!("[{j}]: {} s is shorter than two time steps of {step} s", durations[j]));
+        }
+    }
+    Ok((1..durations.len()).step_by(2).map(|j| Swing::given(switches[j], switches[j + 1])).collect())
 }
 
 #[cfg(test)]
@@ -192,11 +187,12 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_lifts_one_foot_at_a_time_and_stands_at_both_ends() {
+    fn a_walk_swings_one_foot_at_a_time_and_stands_at_both_ends() {
         let gait = Gait::new(&scenario(""), &names(), 1.0).expect("a gait");
         assert_eq!(gait.intervals, 200);
         for k in 0..=200 {
-            let up = (0..4).filter(|&f| gait.swing_at(f, k).is_some()).count();
+            let swings = |swings: &[Swing]| swings.iter().any(|s| s.start < k as f64 && (k as f64) < s.end);
+            let up = gait.swings.iter().filter(|foot| swings(foot)).count();
             assert!(up <= 1, "sample {k}: {up} feet in the air");
             if !(6..=194).contains(&k) {
                 assert_eq!(up, 0);
