@@ -147,7 +147,7 @@ fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize)
 /// # Errors
 /// The part of the message after `gait.phases[foot]`.
 fn custom_swings(durations: &[f64], step: f64, intervals: usize) -> std::result::Result<Vec<Swing>, String> {
-    if durations.len() % 2 == 0 {
+    if durations.len().is_multiple_of(2) {
         return Err(format!(
             ": {} durations; the number must be odd because a foot stands at the start and at the end",
             durations.len()
