@@ -81,6 +81,7 @@
 //! m g · 1 m, so that one tolerance suits every row.
 
 pub mod bench;
+mod bspline;
 pub mod check;
 pub mod cli;
 pub mod constraints;

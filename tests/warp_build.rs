@@ -1,4 +1,4 @@
-//! Maps built over whole terrains: their quality against the design's numbers, their cache, and what is refused.
+//! Maps over whole terrains: their quality, their cache, and invalid specifications.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -8,7 +8,7 @@ use warpgait::heightfield::Heightfield;
 use warpgait::scenario::{MapMethod, MapSpec};
 use warpgait::warp::{MapProgress, MapReport, Order, WarpMap, build, build_cached};
 
-fn go_on(_: MapProgress) -> ControlFlow<()> {
+fn keep_going(_: MapProgress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
@@ -29,7 +29,7 @@ fn spec(cells: [usize; 3]) -> MapSpec {
     MapSpec { cells: Some(cells), ..MapSpec::default() }
 }
 
-/// What every finished map must hold to, judged by evaluating it and not by its report.
+/// Properties of every finished map, checked by evaluating it, regardless of its report.
 fn check_map(map: &WarpMap, field: &Heightfield, misfit: f64) {
     for i in 0..=60 {
         for j in 0..=60 {
@@ -42,7 +42,7 @@ fn check_map(map: &WarpMap, field: &Heightfield, misfit: f64) {
                 assert!(det > 0.0, "folded at {s} {t} {z}");
             }
         }
-        // The side faces slide in themselves.
+        // The side faces stay in their planes.
         let s = -3.0 + 0.1 * f64::from(i);
         for z in [0.0, 0.7, 2.0] {
             for side in [-3.0, 3.0] {
@@ -54,36 +54,36 @@ fn check_map(map: &WarpMap, field: &Heightfield, misfit: f64) {
 }
 
 #[test]
-fn the_medium_ripple_is_as_conformal_as_designed() {
+fn the_map_of_the_medium_ripple_is_nearly_conformal() {
     let field = rippled();
-    let (map, report) = build(&field, &MapSpec::default(), &mut go_on).unwrap();
+    let (map, report) = build(&field, &MapSpec::default(), &mut keep_going).unwrap();
     assert!(report.converged && report.inverted_points == 0 && report.warnings.is_empty());
     assert!(report.conformal_ground.mean < 0.040, "{report:?}");
     assert!(report.misfit_max < 1e-4, "{report:?}");
     assert!(report.min_determinant > 0.8 && report.normal_angle.max < 1.0);
     check_map(&map, &field, 1e-4);
-    // On the shear, the same measure is several times larger.
+    // The conformal error of the shear is several times larger.
     let shear = MapSpec { method: MapMethod::Shear, ..MapSpec::default() };
-    let (map, sheared) = build(&field, &shear, &mut go_on).unwrap();
+    let (map, sheared) = build(&field, &shear, &mut keep_going).unwrap();
     assert!(sheared.conformal_ground.mean > 4.0 * report.conformal_ground.mean);
     assert!((sheared.min_determinant - 1.0).abs() < 1e-9);
     check_map(&map, &field, 1e-4);
 }
 
 #[test]
-fn a_medium_hill_is_met_to_a_millimetre() {
+fn the_map_of_a_medium_hill_is_accurate_to_a_millimeter() {
     let field = hilly(1.0);
-    let (map, report) = build(&field, &MapSpec::default(), &mut go_on).unwrap();
+    let (map, report) = build(&field, &MapSpec::default(), &mut keep_going).unwrap();
     assert!(report.converged && report.inverted_points == 0);
     assert!(report.conformal_ground.mean < 0.027 && report.misfit_max < 1e-3, "{report:?}");
     check_map(&map, &field, 1e-3);
 }
 
-/// With the least weight above the ground this one folds at the top of the box.
+/// Without a second attempt with more weight above the ground, this one would fold at the top of the box.
 #[test]
 fn a_peak_of_slope_three_is_not_folded() {
     let field = hilly(3.0);
-    let (map, report) = build(&field, &spec([24, 24, 8]), &mut go_on).unwrap();
+    let (map, report) = build(&field, &spec([24, 24, 8]), &mut keep_going).unwrap();
     assert!(report.inverted_points == 0, "{report:?}");
     assert!(report.conformal_ground.mean < 0.12, "{report:?}");
     check_map(&map, &field, 0.2);
@@ -92,15 +92,16 @@ fn a_peak_of_slope_three_is_not_folded() {
 #[test]
 fn more_weight_at_the_torso_makes_the_map_gentler_there() {
     let field = hilly(1.0);
-    let made =
-        |torso_weight| build(&field, &MapSpec { torso_weight, ..spec([24, 24, 8]) }, &mut go_on).unwrap().1;
+    let made = |torso_weight| {
+        build(&field, &MapSpec { torso_weight, ..spec([24, 24, 8]) }, &mut keep_going).unwrap().1
+    };
     let (light, heavy) = (made(0.03), made(0.3));
     assert!(heavy.conformal_torso.mean < light.conformal_torso.mean);
     assert!(heavy.conformal_ground.mean > light.conformal_ground.mean);
 }
 
 #[test]
-fn cells_are_about_square_over_oblong_ground() {
+fn cells_over_oblong_ground_are_nearly_square() {
     let cells = |extent| MapSpec::default().cells(extent);
     assert_eq!(cells([-3.0, 3.0, -3.0, 3.0]), [48, 48, 16]);
     assert_eq!(cells([0.0, 2.0, 0.0, 16.0]), [16, 136, 16]);
@@ -110,7 +111,7 @@ fn cells_are_about_square_over_oblong_ground() {
 #[test]
 fn flat_ground_needs_no_warp() {
     let field = terrain(|_, _| 0.2);
-    let (map, report) = build(&field, &spec([16, 12, 8]), &mut go_on).unwrap();
+    let (map, report) = build(&field, &spec([16, 12, 8]), &mut keep_going).unwrap();
     assert_eq!(report.iterations, 0);
     let p = map.position([0.4, -1.3, 0.6]);
     assert!((p[0] - 0.4).abs() + (p[1] + 1.3).abs() + (p[2] - 0.8).abs() < 1e-9, "{p:?}");
@@ -119,9 +120,9 @@ fn flat_ground_needs_no_warp() {
 
 #[test]
 fn a_cliff_is_not_folded() {
-    // Slope 7.5: far more than the cells can follow at once, so that ground is grown in steps.
+    // Slope 7.5 is more than the cells can follow at once, so the ground grows in steps.
     let field = terrain(|x, y| -0.45 * (1.0 - ((x * x + y * y - 1.44) / (2.4 * 0.06)).tanh()));
-    let (map, report) = build(&field, &spec([32, 32, 8]), &mut go_on).unwrap();
+    let (map, report) = build(&field, &spec([32, 32, 8]), &mut keep_going).unwrap();
     assert_eq!(report.inverted_points, 0, "{report:?}");
     assert!(report.warnings.iter().any(|w| w.contains("misses the terrain")), "{report:?}");
     check_map(&map, &field, 0.06);
@@ -132,14 +133,14 @@ fn odd_numbers_of_cells_and_oblong_terrains_work() {
     let field =
         Heightfield::from_function([0.0, 4.0, -1.0, 1.5], 0.05, |x, y| Ok(0.1 * (2.0 * x).sin() + 0.05 * y))
             .unwrap();
-    let (map, report) = build(&field, &spec([25, 17, 9]), &mut go_on).unwrap();
+    let (map, report) = build(&field, &spec([25, 17, 9]), &mut keep_going).unwrap();
     assert!(report.converged && report.inverted_points == 0 && report.misfit_max < 1e-3, "{report:?}");
     let back = map.inverse(map.position([2.2, 0.4, 0.5])).unwrap();
     assert!((back[0] - 2.2).abs() + (back[1] - 0.4).abs() + (back[2] - 0.5).abs() < 1e-9);
 }
 
 #[test]
-fn progress_falls_and_may_stop_the_work() {
+fn the_reported_energy_falls_and_progress_may_stop_the_optimizer() {
     let mut seen: Vec<MapProgress> = Vec::new();
     build(&rippled(), &spec([24, 24, 8]), &mut |p| {
         seen.push(p);
@@ -156,7 +157,7 @@ fn progress_falls_and_may_stop_the_work() {
 }
 
 #[test]
-fn grids_that_make_no_sense_are_refused() {
+fn invalid_grids_are_rejected() {
     for bad in [
         spec([2, 48, 16]),
         spec([48, 48, 100_000]),
@@ -164,16 +165,16 @@ fn grids_that_make_no_sense_are_refused() {
         MapSpec { thickness: -1.0, ..MapSpec::default() },
         MapSpec { thickness: f64::NAN, ..MapSpec::default() },
     ] {
-        assert!(matches!(build(&rippled(), &bad, &mut go_on), Err(Error::Input(_))), "{bad:?}");
+        assert!(matches!(build(&rippled(), &bad, &mut keep_going), Err(Error::Input(_))), "{bad:?}");
     }
 }
 
 fn cached(field: &Heightfield, spec: &MapSpec, dir: &Path) -> (WarpMap, MapReport, bool) {
-    build_cached(field, spec, Some(dir), &mut go_on).unwrap()
+    build_cached(field, spec, Some(dir), &mut keep_going).unwrap()
 }
 
 #[test]
-fn the_cache_knows_what_a_map_depends_on_and_survives_damage() {
+fn the_cache_key_covers_all_inputs_and_damaged_files_are_replaced() {
     let dir = tempfile::tempdir().unwrap();
     let small = spec([12, 12, 8]);
     let (map, report, hit) = cached(&rippled(), &small, dir.path());
@@ -182,10 +183,10 @@ fn the_cache_knows_what_a_map_depends_on_and_survives_damage() {
     assert!(hit && again == map);
     assert_eq!((same.method, same.iterations), (report.method, report.iterations));
     assert!((same.conformal_ground.mean - report.conformal_ground.mean).abs() < 1e-12);
-    // Another terrain, another specification.
+    // A different terrain; a different specification.
     assert!(!cached(&hilly(0.3), &small, dir.path()).2);
     assert!(!cached(&rippled(), &spec([12, 12, 9]), dir.path()).2);
-    // Damage of any kind is built over.
+    // Maps are built again if their files are damaged.
     let files: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(files.len(), 3, "{files:?}");
     for file in &files {
@@ -204,10 +205,10 @@ fn the_cache_knows_what_a_map_depends_on_and_survives_damage() {
 }
 
 #[test]
-fn a_cache_that_cannot_be_written_costs_a_warning_only() {
+fn an_unwritable_cache_causes_only_a_warning() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("file");
     std::fs::write(&file, b"").unwrap();
     let (_, report, hit) = cached(&rippled(), &spec([12, 12, 8]), &file);
-    assert!(!hit && report.warnings.iter().any(|w| w.contains("kept")), "{report:?}");
+    assert!(!hit && report.warnings.iter().any(|w| w.contains("cache")), "{report:?}");
 }

@@ -1,4 +1,4 @@
-//! Every method of the map on small grids: what each promises, and what is said where it cannot keep it.
+//! The guarantees of every method on small grids, and the messages where they fail.
 
 use std::ops::ControlFlow;
 
@@ -42,7 +42,7 @@ fn determinant(map: &WarpMap, at: [f64; 3]) -> f64 {
     nalgebra::Matrix3::from_fn(|r, c| j[r][c]).determinant()
 }
 
-/// Points of the judgement where the map is folded, counted one by one.
+/// The number of folded points on the grid of the report, counted one by one.
 fn folded(map: &WarpMap) -> usize {
     let [nx, ny, nz] = map.cells().map(|n| 3 * n);
     let (origin, size) = (map.origin(), map.size());
@@ -50,8 +50,8 @@ fn folded(map: &WarpMap) -> usize {
     for i in 0..=nx {
         for j in 0..=ny {
             for k in 0..=nz {
-                let share = [i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64];
-                let at = std::array::from_fn(|d| origin[d] + share[d] * size[d]);
+                let fractions = [i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64];
+                let at = std::array::from_fn(|d| origin[d] + fractions[d] * size[d]);
                 count += usize::from(determinant(map, at) <= 0.0);
             }
         }
@@ -60,7 +60,7 @@ fn folded(map: &WarpMap) -> usize {
 }
 
 #[test]
-fn every_method_keeps_the_sides_and_lies_on_the_ground() {
+fn every_method_keeps_the_sides_and_is_on_the_ground() {
     for (name, field) in [("ripple", rippled(0.15)), ("hill", hilly(0.5))] {
         for method in OPTIMIZED.into_iter().chain([MapMethod::Shear]) {
             let (map, report) = made(&field, &small(method));
@@ -88,7 +88,7 @@ fn every_method_keeps_the_sides_and_lies_on_the_ground() {
 }
 
 #[test]
-fn energies_fall_where_a_method_promises_it() {
+fn energies_fall_where_a_method_guarantees_it() {
     for (name, field) in [("ripple", rippled(0.15)), ("hill", hilly(0.8))] {
         for method in OPTIMIZED {
             let (_, report) = made(&field, &small(method));
@@ -108,7 +108,7 @@ fn energies_fall_where_a_method_promises_it() {
 }
 
 #[test]
-fn conformal_methods_beat_the_shear_at_the_ground() {
+fn conformal_methods_are_better_than_the_shear_at_the_ground() {
     let field = rippled(0.15);
     let error = |spec: &MapSpec| made(&field, spec).1.conformal_ground.mean;
     let shear = error(&small(MapMethod::Shear));
@@ -119,7 +119,7 @@ fn conformal_methods_beat_the_shear_at_the_ground() {
 }
 
 #[test]
-fn the_printed_scale_makes_another_map() {
+fn the_scale_printed_in_the_paper_yields_a_different_map() {
     let field = rippled(0.15);
     for method in [MapMethod::AcapLocalGlobal, MapMethod::AcapNewton] {
         let (trace, report) = made(&field, &small(method));
@@ -132,7 +132,7 @@ fn the_printed_scale_makes_another_map() {
 }
 
 #[test]
-fn the_barrier_holds_where_others_fold() {
+fn barriers_prevent_folds_where_other_methods_fold() {
     let field = hilly(1.0);
     for method in [MapMethod::AcapNewton, MapMethod::Mips] {
         let (map, report) = made(&field, &small(method));
@@ -144,10 +144,10 @@ fn the_barrier_holds_where_others_fold() {
     assert_eq!(report.inverted_points, folded(&map));
     let there = determinant(&map, report.min_determinant_at);
     assert!((there - report.min_determinant).abs() < 1e-6 * there.abs(), "{there}");
-    let said = report.warnings.iter().find(|w| w.contains("folds")).unwrap();
-    assert!(said.contains("mips") && said.contains(&report.inverted_points.to_string()), "{said}");
-    let refusal = report.ensure_injective().unwrap_err();
-    assert!(matches!(refusal, Error::Input(_)) && refusal.to_string().contains("mips"), "{refusal}");
+    let warning = report.warnings.iter().find(|w| w.contains("folds")).unwrap();
+    assert!(warning.contains("mips") && warning.contains(&report.inverted_points.to_string()), "{warning}");
+    let error = report.ensure_injective().unwrap_err();
+    assert!(matches!(error, Error::Input(_)) && error.to_string().contains("mips"), "{error}");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn flat_ground_needs_no_warp_by_any_method() {
 }
 
 #[test]
-fn auto_takes_the_first_that_is_good_enough_and_says_why() {
+fn auto_uses_the_first_method_that_is_good_enough_and_reports_the_others() {
     let (map, report) = made(&rippled(0.02), &small(MapMethod::Auto));
     assert_eq!((report.method, report.rejected.len()), (MapMethod::Shear, 0));
     assert_eq!(map, made(&rippled(0.02), &small(MapMethod::Shear)).0);
@@ -177,8 +177,8 @@ fn auto_takes_the_first_that_is_good_enough_and_says_why() {
 }
 
 #[test]
-fn cells_that_are_not_given_are_made_finer_where_the_bottom_misses() {
-    // A bump that 48 cells follow to some millimetres only.
+fn cells_are_refined_where_the_bottom_misses_unless_given() {
+    // A bump that 48 cells follow only to a few millimeters.
     let field = terrain(|x, y| 0.35 * (-(x * x + y * y) / 0.05).exp());
     let open = MapSpec { method: MapMethod::Shear, ..MapSpec::default() };
     let (_, given) = made(&field, &MapSpec { cells: Some(open.cells(field.extent())), ..open.clone() });
@@ -206,10 +206,10 @@ fn no_motion_is_planned_over_a_folded_map() {
     assert_eq!((code, out.as_str()), (2, ""), "{err}");
     assert!(err.contains("folds at") && err.contains("map.method = \"mips\""), "{err}");
     assert!(!folder.path().join("s.plan.npz").exists());
-    // The map itself may be looked at, and is not sound.
+    // The map itself can be built and is reported as unsound.
     let (code, out, _) = run(&["map", "s.toml", "--json"]);
-    let said: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!((code, &said["sound"]), (1, &serde_json::Value::Bool(false)));
-    assert!(said["report"]["inverted_points"].as_u64().unwrap() > 0);
-    assert!(said["report"]["history"][0]["energy"].as_array().unwrap().len() > 1);
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, &report["sound"]), (1, &serde_json::Value::Bool(false)));
+    assert!(report["report"]["inverted_points"].as_u64().unwrap() > 0);
+    assert!(report["report"]["history"][0]["energy"].as_array().unwrap().len() > 1);
 }

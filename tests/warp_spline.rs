@@ -1,10 +1,10 @@
-//! φ and its derivatives on a curved map, inside and outside of its box.
+//! φ, its derivatives and its inverse on a curved map, inside and outside its box.
 
 use warpgait::heightfield::Heightfield;
 use warpgait::scenario::{MapMethod, MapSpec};
 use warpgait::warp::{Order, WarpMap};
 
-/// A map with curvature in all three axes and components, still injective: the identity plus waves on the control points.
+/// An injective map that is curved along all axes and in all components: waves are added to the control points of the identity.
 fn curved() -> WarpMap {
     let spec = MapSpec { method: MapMethod::Shear, cells: Some([12, 10, 6]), ..MapSpec::default() };
     let mut grid = WarpMap::flat([-3.0, 3.0, -2.0, 3.0], &spec).unwrap().to_grid();
@@ -17,7 +17,7 @@ fn curved() -> WarpMap {
     WarpMap::from_grid(&grid).unwrap()
 }
 
-/// Points of a fixed pseudo-random sequence in the box enlarged by `margin` of its size.
+/// Pseudo-random points in the box enlarged on all sides by the fraction `margin` of its size.
 fn points(map: &WarpMap, margin: f64, count: usize) -> Vec<[f64; 3]> {
     let mut state = 7_u64;
     let mut uniform = move || {
@@ -42,7 +42,7 @@ fn derivatives_match_central_differences_inside_and_outside() {
     let step = 1e-5;
     for margin in [0.0, 0.4] {
         for x in points(&map, margin, 400) {
-            // The third derivative jumps at knots: stay clear of them.
+            // The third derivative jumps at knots; keep away from them.
             let clear = (0..3).all(|d| {
                 let s = (x[d] - map.origin()[d]) / map.cell()[d];
                 (s - s.round()).abs() > 1e-3
@@ -84,7 +84,7 @@ fn derivatives_match_central_differences_inside_and_outside() {
 }
 
 #[test]
-fn lower_orders_agree_with_the_full_jet_and_leave_the_rest_zero() {
+fn lower_orders_agree_with_the_full_jet_and_the_rest_is_zero() {
     let map = curved();
     for x in points(&map, 0.3, 50) {
         let full = map.jet(x, Order::Third);
@@ -156,7 +156,7 @@ fn inverse_round_trips_inside_and_outside() {
 }
 
 #[test]
-fn inverse_refuses_what_lies_far_outside() {
+fn points_far_outside_have_no_inverse() {
     let map = curved();
     for p in [[50.0, 0.0, 0.5], [0.0, f64::NAN, 0.0], [0.0, 0.0, -40.0]] {
         let message = map.inverse(p).unwrap_err().to_string();
@@ -166,21 +166,7 @@ fn inverse_refuses_what_lies_far_outside() {
 }
 
 #[test]
-fn blending_is_linear_and_needs_one_grid() {
-    let map = curved();
-    let spec = MapSpec { cells: Some([12, 10, 6]), ..MapSpec::default() };
-    let flat = WarpMap::flat([-3.0, 3.0, -2.0, 3.0], &spec).unwrap();
-    let half = flat.blend(&map, 0.25).unwrap();
-    let x = [0.3, 0.4, 0.5];
-    for c in 0..3 {
-        assert!((half.position(x)[c] - 0.75 * flat.position(x)[c] - 0.25 * map.position(x)[c]).abs() < 1e-13);
-    }
-    let other = WarpMap::flat([-3.0, 3.0, -2.0, 3.0], &MapSpec::default()).unwrap();
-    assert!(map.blend(&other, 0.5).is_err());
-}
-
-#[test]
-fn stored_maps_come_back_and_broken_ones_are_refused() {
+fn stored_maps_are_restored_and_broken_ones_rejected() {
     let map = curved();
     let grid = map.to_grid();
     let back = WarpMap::from_grid(&grid).unwrap();
@@ -200,7 +186,7 @@ fn stored_maps_come_back_and_broken_ones_are_refused() {
 }
 
 #[test]
-fn the_shear_lies_on_the_ground() {
+fn the_shear_is_on_the_ground() {
     let height = |x: f64, y: f64| 0.15 * (2.6 * x).sin() * (2.6 * y).sin() + 0.1 * x;
     let field = Heightfield::from_function([-3.0, 3.0, -2.0, 2.0], 0.02, |x, y| Ok(height(x, y))).unwrap();
     let map = WarpMap::shear(&field, &MapSpec::default()).unwrap();

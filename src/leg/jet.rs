@@ -1,10 +1,10 @@
-//! Numbers that carry their first and second derivatives in three variables, so that kinematics is written once.
+//! Numbers with first and second derivatives in three variables (forward automatic differentiation).
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use nalgebra::{Matrix3, Vector3};
 
-/// What the kinematics needs of a number: [`f64`] for values, [`Jet`] for derivatives as well.
+/// The number type of the kinematics: [`f64`] for values alone, [`Jet`] for values with derivatives.
 pub trait Scalar:
     Copy
     + Add<Output = Self>
@@ -14,11 +14,11 @@ pub trait Scalar:
     + Add<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
-    /// √ of a positive number.
+    /// √x for x > 0.
     fn sqrt(self) -> Self;
-    /// 1/x of a number that is not zero.
+    /// 1/x for x ≠ 0.
     fn recip(self) -> Self;
-    /// The angle of the point (x, self), off the origin.
+    /// The polar angle of the point (x, self), which must not be the origin.
     fn atan2(self, x: Self) -> Self;
 }
 
@@ -48,7 +48,7 @@ pub struct Jet {
 }
 
 impl Jet {
-    /// The coordinates of a point as functions of it.
+    /// The coordinates of a point as functions of the point.
     pub fn variables(point: &Vector3<f64>) -> [Self; 3] {
         std::array::from_fn(|d| {
             let mut first = Vector3::zeros();
@@ -57,7 +57,7 @@ impl Jet {
         })
     }
 
-    /// g(f) for g with the derivatives g1 and g2 at f.
+    /// g(f), given the value of g and its first and second derivatives, g1 and g2, at f.
     fn chain(self, value: f64, g1: f64, g2: f64) -> Self {
         let first = self.first * g1;
         Self { value, first, second: self.second * g1 + self.first * self.first.transpose() * g2 }
@@ -78,7 +78,7 @@ impl Scalar for Jet {
     fn atan2(self, x: Self) -> Self {
         let y = self;
         let square = x.value * x.value + y.value * y.value;
-        // ∇θ = (x ∇y − y ∇x)/s; its derivative, with ∇x ∇yᵀ cancelling against its mirror image.
+        // ∇θ = (x ∇y − y ∇x)/s and its derivative, s = x² + y².
         let turn = y.first * x.value - x.first * y.value;
         let growth = (x.first * x.value + y.first * y.value) * (2.0 / square);
         let bent = y.second * x.value - x.second * y.value;
@@ -152,7 +152,7 @@ impl Mul<f64> for Jet {
 mod tests {
     use super::*;
 
-    /// Everything a jet can do in one function.
+    /// A function that uses all operations.
     fn function<T: Scalar>([x, y, z]: [T; 3]) -> T {
         (x * y - z * 0.3 + 2.0).sqrt().atan2(y * z + 1.7) + (x * x + 0.5).recip() * -z
     }

@@ -13,8 +13,9 @@ use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
 use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::Ground;
-use crate::trajectory::layout::{FootVariables, Layout};
+use crate::trajectory::Layout;
 use crate::trajectory::sampling;
+use crate::trajectory::variables::FootVariables;
 use crate::warp::WarpMap;
 
 /// Samples of a plan within one time step.

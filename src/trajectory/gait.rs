@@ -1,6 +1,5 @@
-//! Which foot stands when. Nominal switches lie on the grid of samples, so that piecewise linear forces have their kinks
-//! where the base's acceleration has its own. With `gait.optimize_durations` they may leave it, each within a room of its
-//! own; see [`super::switches`].
+//! Which foot stands when. Nominal switches are on samples, so that the piecewise linear forces and the base's acceleration have
+//! their kinks at the same times. With `gait.optimize_durations` each switch may move within some room; see [`super::switches`].
 
 use super::phase::{Stance, Swing};
 use super::switches;
@@ -8,37 +7,38 @@ use crate::robot::Robot;
 use crate::scenario::{GaitKind, Scenario};
 use crate::{Error, Result};
 
-/// Standing at the start and at the end, s.
+/// Least time of standing at the start and at the end, s, in which the base accelerates and stops.
 const STAND: f64 = 0.3;
+/// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
+const CYCLE: f64 = 1.0;
+/// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
+const SHORTEST_PHASE: f64 = 2.0;
 
-/// Swings by foot, in order of time.
+/// The swings of each foot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gait {
-    /// Intervals of the sample grid.
+    /// Number of time steps.
     pub intervals: usize,
-    /// By foot.
+    /// `swings[foot]`, in order of time.
     pub swings: Vec<Vec<Swing>>,
 }
-
-/// Length of a gait's cycle, s, where neither scenario nor robot name one.
-const CYCLE: f64 = 1.0;
 
 impl Gait {
     /// The gait of a scenario for its robot.
     ///
     /// # Errors
-    /// For a gait that the robot, the horizon or the time step does not allow, or whose durations cannot be optimized.
+    /// If the gait does not fit the robot, the horizon or the time step, or its durations cannot be optimized.
     pub fn of(scenario: &Scenario, robot: &Robot) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
     }
 
-    /// The gait of a scenario for feet named LF, RF, LH, RH (the shipped patterns) or in the robot's order (custom); `cycle` is the
+    /// The gait of a scenario for feet named LF, RF, LH, RH (the built-in patterns) or in the robot's order (custom); `cycle` is the
     /// length of a cycle, s, where the scenario names none.
     ///
     /// # Errors
     /// [`Error::Key`] for a gait that the feet, the horizon or the time step do not allow.
-    pub fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
+    fn new(scenario: &Scenario, foot_names: &[String], cycle: f64) -> Result<Self> {
         let step = scenario.time_step;
         let intervals = (scenario.horizon / step).round() as usize;
         let gait = &scenario.gait;
@@ -61,7 +61,7 @@ impl Gait {
         Ok(Self { intervals, swings })
     }
 
-    /// The stances of a foot, in order of time: one more than its swings.
+    /// The stances of a foot in order of time, one more than its swings.
     pub fn stances(&self, foot: usize) -> Vec<Stance> {
         let swings = &self.swings[foot];
         (0..=swings.len())
@@ -71,17 +71,12 @@ impl Gait {
             })
             .collect()
     }
-
-    /// The swing that sample `k` lies strictly inside of, or may lie inside of, if any.
-    pub fn swing_at(&self, foot: usize, k: usize) -> Option<usize> {
-        self.swings[foot].iter().position(|s| s.span()[0] < k as f64 && (k as f64) < s.span()[1])
-    }
 }
 
-/// Lift-off of each foot as a share of the cycle, and the usual duty factor.
+/// The lift-off of each foot, as a fraction of the cycle, and the default duty factor.
 fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
     let (table, duty): ([f64; 4], f64) = match kind {
-        // LH, LF, RH, RF, one foot at a time.
+        // One foot at a time: LH, LF, RH, RF.
         GaitKind::Walk => ([0.25, 0.75, 0.0, 0.5], 0.75),
         GaitKind::Trot => ([0.0, 0.5, 0.5, 0.0], 0.6),
         GaitKind::Pace => ([0.0, 0.5, 0.0, 0.5], 0.6),
@@ -94,7 +89,7 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
         .map(|name| {
             order.iter().position(|o| o == name).map(|i| table[i]).ok_or_else(|| {
                 let what = format!(
-                    "the shipped gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
+                    "the built-in gaits are for feet named LF, RF, LH, RH, but the robot has a foot \"{name}\"; use kind = \"custom\" with phases"
                 );
                 Error::key("gait.kind", what)
             })
@@ -103,10 +98,10 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
     Ok((offsets, duty))
 }
 
-/// As many whole cycles as fit between standing at the start and at the end; what is left is standing too.
+/// As many whole cycles as fit into the horizon with standing at both ends. The remaining time is divided between the ends.
 fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Result<Vec<Vec<Swing>>> {
     let swing = ((1.0 - duty) * cycle / step).round();
-    if swing < 2.0 {
+    if swing < SHORTEST_PHASE {
         let what = format!(
             "a swing of {:.3} s (cycle {cycle} s, duty {duty}) is shorter than two time steps of {step} s; lengthen the cycle, or lower the duty or the time_step",
             (1.0 - duty) * cycle
@@ -114,7 +109,7 @@ fn cyclic(offsets: &[f64], duty: f64, cycle: f64, horizon: f64, step: f64) -> Re
         return Err(Error::key("gait.cycle", what));
     }
     let last = offsets.iter().fold(0.0, |a: f64, &b| a.max(b)) + (1.0 - duty);
-    // n cycles take (n - 1 + last) cycle lengths.
+    // n cycles take n − 1 + last times the duration of one; the summand of 1e-9 absorbs rounding.
     let cycles = ((horizon - 2.0 * STAND) / cycle - last + 1.0 + 1e-9).floor();
     if cycles < 1.0 {
         let what = format!(
@@ -144,7 +139,7 @@ fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize)
     };
     let row = |(foot, durations): (usize, &Vec<f64>)| {
         let key = format!("gait.phases[{foot}]");
-        if durations.len() % 2 == 0 {
+        if durations.len().is_multiple_of(2) {
             let what = format!(
                 "given {} durations, allowed: an odd number, because a foot stands at the start and at the end",
                 durations.len()
@@ -159,7 +154,7 @@ fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize)
         }
         edges[durations.len()] = intervals as f64;
         for (j, pair) in edges.windows(2).enumerate() {
-            if pair[1] < pair[0] + 2.0 {
+            if pair[1] < pair[0] + SHORTEST_PHASE {
                 let what =
                     format!("given {} s, which is shorter than two time steps of {step} s", durations[j]);
                 return Err(Error::key(format!("{key}[{j}]"), what));
@@ -186,11 +181,12 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_lifts_one_foot_at_a_time_and_stands_at_both_ends() {
+    fn a_walk_swings_one_foot_at_a_time_and_stands_at_both_ends() {
         let gait = Gait::new(&scenario(""), &names(), 1.0).expect("a gait");
         assert_eq!(gait.intervals, 200);
         for k in 0..=200 {
-            let up = (0..4).filter(|&f| gait.swing_at(f, k).is_some()).count();
+            let swings = |swings: &[Swing]| swings.iter().any(|s| s.start < k as f64 && (k as f64) < s.end);
+            let up = gait.swings.iter().filter(|foot| swings(foot)).count();
             assert!(up <= 1, "sample {k}: {up} feet in the air");
             if !(6..=194).contains(&k) {
                 assert_eq!(up, 0);

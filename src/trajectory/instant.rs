@@ -1,16 +1,16 @@
-//! Where on the time axis rows are asked.
+//! The instants at which rows are imposed.
 
-/// A sample, or half way to the next.
+/// A sample, or halfway to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instant {
     /// Sample k.
     Sample(usize),
-    /// k + ½.
+    /// Halfway from sample k to the next.
     Between(usize),
 }
 
 impl Instant {
-    /// In samples.
+    /// The time in samples.
     pub fn time(self) -> f64 {
         match self {
             Self::Sample(k) => k as f64,

@@ -1,98 +1,44 @@
-//! Where every variable of the NLP sits, and every sampled quantity as a linear combination of variables.
+//! The place of every variable of the NLP, the c of Eq. 1 and c̄ of Eq. 7, and every sampled quantity as a linear combination of them.
 //!
 //! | block | variables |
 //! | --- | --- |
-//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, coarser, about every n-th); the first three coincide, and so do the last three: the motion starts and ends at rest |
-//! | footholds | (x̄, ȳ, z̄) for each stance |
-//! | swings | three inner control points of a clamped cubic B-spline; its outer two on each side are the footholds, so that feet leave and land with zero velocity |
-//! | forces | f̄ at every sample of a stance (or, coarser, at about every n-th) but the switches, where it is zero; linear in between |
-//! | switches | lift-off and touch-down of each swing in samples, where durations are optimized; see [`super::switches`] |
+//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, if coarser, at about every n-th); the first three coincide, and so do the last three, so that the motion starts and ends at rest |
+//! | footholds | (x̄, ȳ, z̄) of each stance |
+//! | swings | three inner control points of a clamped cubic B-spline; its outer two on each side are the footholds, so that feet lift off and touch down with zero velocity |
+//! | forces | f̄ at every sample of a stance (or, if coarser, at about every n-th) except at the switches, where it is zero; linear in between |
+//! | switches | lift-off and touch-down of each swing in samples, if durations are optimized; see [`super::switches`] |
 //!
-//! The base's acceleration is (nearly) piecewise linear on the same grid as the forces, and so Newton's law can hold
-//! between the samples as well as at them. Coarser knots are there to measure what that is worth ([`KnotSpacing`]).
+//! The base's acceleration is (nearly) piecewise linear on the same grid as the forces, so Newton's law can hold between the samples
+//! as well as at them. Coarser knots exist to measure how much that matters ([`KnotSpacing`]).
+//!
+//! The •₋ and •₋₋ of Eq. 14, one and two time steps back, are the nodes of samples k − 1 and k − 2.
 
 use std::ops::Range;
 
 use super::gait::Gait;
 use super::instant::Instant;
 use super::node::LinearNode;
-use super::phase::{Stance, Swing};
-use super::spline::{SWING_CONTROL_POINTS, SWING_INTERVALS, clamped_cubic, uniform_cubic};
-use super::switches::{self, TimedNode, force_samples};
+use super::phase::Stance;
+use super::spline::{SWING_CONTROL_POINTS, SWING_POINTS, swing_basis};
+use super::switches::{TimedNode, force_samples};
+use super::variables::{FootVariables, StanceVariables, SwingVariables};
+use crate::bspline::uniform_cubic;
 
-/// Distance of the knots, in samples.
+/// Distance between knots, in samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KnotSpacing {
-    /// Of the base's spline; the nearest that divides the horizon is taken.
+    /// Of the base's spline; rounded so that it divides the horizon.
     pub base: usize,
-    /// Of the forces; the nearest that divides each stance is taken.
+    /// Of the forces; rounded so that it divides each stance.
     pub force: usize,
 }
 
-impl KnotSpacing {
-    /// A knot at every sample.
-    pub const FINE: Self = Self { base: 1, force: 1 };
-}
-
-/// The variables of one stance.
-#[derive(Clone, Debug)]
-pub struct StanceVariables {
-    /// When.
-    pub stance: Stance,
-    /// The foothold, three components.
-    pub foothold: LinearNode,
-    /// The first sample with a force.
-    pub first_force: usize,
-    /// f̄ at the samples from there on, three components: all at which the foot may bear something. Where durations are
-    /// optimized, ḡ.
-    pub forces: Vec<LinearNode>,
-}
-
-impl StanceVariables {
-    /// The samples with a free force, and its node.
-    pub fn free_forces(&self) -> impl Iterator<Item = (usize, &LinearNode)> + '_ {
-        self.forces.iter().enumerate().map(|(n, node)| (self.first_force + n, node))
-    }
-
-    /// The force at sample k, if it is free there.
-    pub fn force(&self, k: usize) -> Option<&LinearNode> {
-        self.forces.get(k.checked_sub(self.first_force)?)
-    }
-}
-
-/// The variables of one swing.
-#[derive(Clone, Debug)]
-pub struct SwingVariables {
-    /// When.
-    pub swing: Swing,
-    /// First of the nine variables of the inner control points.
-    pub control_points: usize,
-    /// The variable that is the lift-off; the next one is the touch-down. None where they are given.
-    pub switches: Option<usize>,
-}
-
-impl SwingVariables {
-    /// Lift-off and touch-down at x, in samples.
-    pub fn times(&self, x: &[f64]) -> [f64; 2] {
-        self.switches.map_or([self.swing.start, self.swing.end], |v| [x[v], x[v + 1]])
-    }
-}
-
-/// The variables of one foot.
-#[derive(Clone, Debug)]
-pub struct FootVariables {
-    /// In order of time.
-    pub stances: Vec<StanceVariables>,
-    /// In order of time; swing j lies between stances j and j + 1.
-    pub swings: Vec<SwingVariables>,
-}
-
-/// What a foot does at a sample.
+/// The phase of a foot at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Stands, in this stance. At a switch the foot counts as standing.
+    /// It stands, in this stance. At a switch the foot counts as standing.
     Stance(usize),
-    /// Moves, in this swing; or may move, where its switches are variables.
+    /// It moves, in this swing, or may move if its switches are variables.
     Swing(usize),
 }
 
@@ -105,40 +51,39 @@ pub struct Layout {
     pub intervals: usize,
     /// Number of variables.
     pub variables: usize,
-    /// Knot intervals of the base.
+    /// Number of knot intervals of the base.
     pub base_intervals: usize,
     /// The base at each sample, six components.
     pub base: Vec<LinearNode>,
-    /// Half way from each sample to the next.
+    /// The base halfway from each sample to the next.
     pub base_between: Vec<LinearNode>,
     /// Velocity and acceleration of the base at each sample, six components.
     pub base_rates: Vec<[LinearNode; 2]>,
-    /// Distinct control points of the base.
+    /// Number of distinct control points of the base.
     pub base_blocks: usize,
-    /// By foot.
+    /// The variables of each foot.
     pub feet: Vec<FootVariables>,
     /// `phase[foot][k]`.
     pub phase: Vec<Vec<Phase>>,
-    /// The same half way from each sample to the next.
+    /// The phase halfway from each sample to the next.
     phase_between: Vec<Vec<Phase>>,
-    /// `nearest_stance[foot][k]`: the stance that a force at a sample belongs to.
+    /// `nearest_stance[foot][k]`: the stance that a force at the sample belongs to.
     nearest_stance: Vec<Vec<usize>>,
 }
 
 impl Layout {
-    /// Lays out the variables of a gait.
+    /// The variables for a gait.
     pub fn new(gait: &Gait, time_step: f64, spacing: KnotSpacing) -> Self {
-        let intervals = gait.intervals;
-        Self::with_base_intervals(gait, time_step, pieces(intervals, spacing.base).max(2), spacing.force)
+        let base_intervals = pieces(gait.intervals, spacing.base).max(2);
+        Self::with_base_intervals(gait, time_step, base_intervals, spacing.force)
     }
 
     /// The same with a given number of knot intervals of the base, at least two.
     pub fn with_base_intervals(gait: &Gait, time_step: f64, base_intervals: usize, force: usize) -> Self {
-        let intervals = gait.intervals;
         let base_blocks = base_intervals - 1;
         let mut layout = Self {
             time_step,
-            intervals,
+            intervals: gait.intervals,
             variables: 6 * base_blocks,
             base_intervals,
             base: Vec::new(),
@@ -150,113 +95,88 @@ impl Layout {
             phase_between: Vec::new(),
             nearest_stance: Vec::new(),
         };
-        layout.base = (0..=intervals).map(|k| layout.base_node(k as f64, 0)).collect();
-        layout.base_between = (0..intervals).map(|k| layout.base_node(k as f64 + 0.5, 0)).collect();
-        layout.base_rates = (0..=intervals)
-            .map(|k| [1, 2].map(|derivative| layout.base_node(k as f64, derivative)))
-            .collect();
+        layout.set_base();
         for foot in 0..gait.swings.len() {
             layout.add_foot(gait, foot, force);
         }
         layout
     }
 
-    fn take(&mut self, count: usize) -> usize {
-        let first = self.variables;
-        self.variables += count;
-        first
+    /// The nodes of the base.
+    fn set_base(&mut self) {
+        let samples = 0..=self.intervals;
+        self.base = samples.clone().map(|k| self.base_node(k as f64, 0)).collect();
+        self.base_between =
+            (0..self.intervals).map(|k| self.base_node(Instant::Between(k).time(), 0)).collect();
+        self.base_rates = samples.map(|k| [1, 2].map(|order| self.base_node(k as f64, order))).collect();
     }
 
-    fn add_foot(&mut self, gait: &Gait, foot: usize, spacing: usize) {
-        let nominal = &gait.swings[foot];
-        let stances: Vec<StanceVariables> = gait
-            .stances(foot)
-            .into_iter()
-            .enumerate()
-            .map(|(j, stance)| {
-                let samples =
-                    force_samples(j.checked_sub(1).map(|j| &nominal[j]), nominal.get(j), self.intervals);
-                StanceVariables {
-                    stance,
-                    foothold: LinearNode::variable(self.take(3)),
-                    first_force: samples.start,
-                    forces: self.force_nodes(stance, samples, spacing),
-                }
-            })
-            .collect();
-        let swings: Vec<SwingVariables> = nominal
-            .iter()
-            .map(|&swing| SwingVariables {
+    /// Appends the variables of a foot: footholds and forces by stance, then control points and switches by swing.
+    fn add_foot(&mut self, gait: &Gait, foot: usize, force_spacing: usize) {
+        let swings = &gait.swings[foot];
+        let mut stances = Vec::with_capacity(swings.len() + 1);
+        for (j, stance) in gait.stances(foot).into_iter().enumerate() {
+            let before = j.checked_sub(1).map(|j| &swings[j]);
+            let samples = force_samples(before, swings.get(j), self.intervals);
+            stances.push(StanceVariables {
+                stance,
+                foothold: LinearNode::variable(self.allocate(3)),
+                first_force: samples.start,
+                forces: self.add_forces(stance, samples, force_spacing),
+            });
+        }
+        let mut swing_variables = Vec::with_capacity(swings.len());
+        for &swing in swings {
+            swing_variables.push(SwingVariables {
                 swing,
-                control_points: self.take(3 * SWING_CONTROL_POINTS),
-                switches: swing.is_free().then(|| self.take(2)),
-            })
-            .collect();
-        self.feet.push(FootVariables { stances, swings });
+                control_points: self.allocate(3 * SWING_CONTROL_POINTS),
+                switches: swing.is_free().then(|| self.allocate(2)),
+            });
+        }
+        self.feet.push(FootVariables { stances, swings: swing_variables });
         self.phase.push(Vec::new());
         self.phase_between.push(Vec::new());
         self.nearest_stance.push(Vec::new());
         self.set_phases(foot);
     }
 
-    fn set_phases(&mut self, foot: usize) {
-        let times = (0..=self.intervals).map(|k| k as f64);
-        self.nearest_stance[foot] = times.clone().map(|time| self.stance_near(foot, time)).collect();
-        self.phase[foot] = times.map(|time| self.phase_of(foot, time)).collect();
-        let middles = (0..self.intervals).map(|k| Instant::Between(k).time());
-        self.phase_between[foot] = middles.map(|time| self.phase_of(foot, time)).collect();
+    /// Appends variables and returns the first.
+    fn allocate(&mut self, count: usize) -> usize {
+        let first = self.variables;
+        self.variables += count;
+        first
     }
 
-    /// Takes the switches from x for good: from now on phases, feet and forces are those of the motion x.
-    pub fn freeze(&mut self, x: &[f64]) {
-        for foot in 0..self.feet.len() {
-            let FootVariables { stances, swings } = &mut self.feet[foot];
-            for (j, swing) in swings.iter_mut().enumerate().filter(|(_, s)| s.switches.is_some()) {
-                let [start, end] = swing.times(x).map(switches::snapped);
-                swing.swing = Swing::given(start, end);
-                stances[j].stance.end = start;
-                stances[j + 1].stance.start = end;
-                swing.switches = None;
-                let before = stances[j].first_force;
-                for (n, node) in stances[j].forces.iter_mut().enumerate() {
-                    node.terms[0].1 *= switches::activation(before + n, None, Some(start));
-                }
-                let after = stances[j + 1].first_force;
-                for (n, node) in stances[j + 1].forces.iter_mut().enumerate() {
-                    node.terms[0].1 *= switches::activation(after + n, Some(end), None);
-                }
-            }
-            self.set_phases(foot);
-        }
-    }
-
-    /// Whether there are switches among the variables.
-    pub fn has_switches(&self) -> bool {
-        self.feet.iter().flat_map(|f| &f.swings).any(|s| s.switches.is_some())
-    }
-
-    /// The forces at some samples of a stance: their own variables, or between those of two coarser nodes of which the ones at
-    /// switches are tied to zero.
-    fn force_nodes(&mut self, stance: Stance, samples: Range<usize>, spacing: usize) -> Vec<LinearNode> {
+    /// The forces at some samples of a stance.
+    fn add_forces(&mut self, stance: Stance, samples: Range<usize>, spacing: usize) -> Vec<LinearNode> {
         if spacing == 1 {
-            return samples.map(|_| LinearNode::variable(self.take(3))).collect();
+            return samples.map(|_| LinearNode::variable(self.allocate(3))).collect();
         }
+        self.add_coarse_forces(stance, samples, spacing)
+    }
+
+    /// Forces interpolated between coarser nodes; those at switches are zero.
+    fn add_coarse_forces(
+        &mut self,
+        stance: Stance,
+        samples: Range<usize>,
+        spacing: usize,
+    ) -> Vec<LinearNode> {
         let length = stance.end - stance.start;
         let pieces = pieces(length as usize, spacing);
-        let nodes: Vec<Option<usize>> = (0..=pieces)
-            .map(|a| {
-                let tied =
-                    (a == 0 && stance.start > 0.0) || (a == pieces && stance.end < self.intervals as f64);
-                (!tied).then(|| self.take(3))
-            })
-            .collect();
+        let mut nodes = Vec::with_capacity(pieces + 1);
+        for a in 0..=pieces {
+            let at_touch_down = a == 0 && stance.start > 0.0;
+            let at_lift_off = a == pieces && stance.end < self.intervals as f64;
+            nodes.push((!at_touch_down && !at_lift_off).then(|| self.allocate(3)));
+        }
         samples
             .map(|k| {
                 let at = (k as f64 - stance.start) * pieces as f64 / length;
                 let before = (at as usize).min(pieces - 1);
-                let share = at - before as f64;
+                let fraction = at - before as f64;
                 let mut node = LinearNode::default();
-                for (variable, weight) in [(nodes[before], 1.0 - share), (nodes[before + 1], share)] {
+                for (variable, weight) in [(nodes[before], 1.0 - fraction), (nodes[before + 1], fraction)] {
                     if let Some(variable) = variable {
                         node.push(variable, weight);
                     }
@@ -267,17 +187,41 @@ impl Layout {
             .collect()
     }
 
-    /// The variables of a control point of the base, 0 ≤ i < base_intervals + 3.
+    /// Tabulates the phases of a foot.
+    fn set_phases(&mut self, foot: usize) {
+        let times = (0..=self.intervals).map(|k| k as f64);
+        self.nearest_stance[foot] = times.clone().map(|time| self.stance_near(foot, time)).collect();
+        self.phase[foot] = times.map(|time| self.phase_of(foot, time)).collect();
+        let middles = (0..self.intervals).map(|k| Instant::Between(k).time());
+        self.phase_between[foot] = middles.map(|time| self.phase_of(foot, time)).collect();
+    }
+
+    /// Replaces the switches by their values at x for good: the phases, feet and forces become those of the motion x.
+    pub fn freeze(&mut self, x: &[f64]) {
+        for foot in 0..self.feet.len() {
+            for j in 0..self.feet[foot].swings.len() {
+                self.feet[foot].freeze_swing(j, x);
+            }
+            self.set_phases(foot);
+        }
+    }
+
+    /// Whether the variables include switches.
+    pub fn has_switches(&self) -> bool {
+        self.feet.iter().flat_map(|f| &f.swings).any(|s| s.switches.is_some())
+    }
+
+    /// The first of the six variables of a control point of the base, 0 ≤ control_point < base_intervals + 3.
     pub fn base_block(&self, control_point: usize) -> usize {
         6 * control_point.clamp(2, self.base_intervals).saturating_sub(2)
     }
 
-    /// Distance of the base's knots, s.
+    /// Distance between the knots of the base, s.
     pub fn base_knot_spacing(&self) -> f64 {
         self.time_step * self.intervals as f64 / self.base_intervals as f64
     }
 
-    /// The base at time `k` in samples (any real number in range): its value, first or second derivative in time.
+    /// The base at time `k` in samples (any real number in range), or its first or second derivative with respect to time.
     pub fn base_node(&self, k: f64, derivative: usize) -> LinearNode {
         let k = k * (self.base_intervals as f64 / self.intervals as f64);
         let interval = (k.max(0.0) as usize).min(self.base_intervals - 1);
@@ -287,7 +231,8 @@ impl Layout {
         for (a, weight) in weights.iter().enumerate() {
             node.push(self.base_block(interval + a), weight * scale);
         }
-        node.terms.retain(|(_, w)| w.abs() > 1e-14 * scale);
+        // Where control points coincide, their weights may cancel.
+        node.terms.retain(|(_, w)| w.abs() > CANCELLED * scale);
         node
     }
 
@@ -299,7 +244,7 @@ impl Layout {
         }
     }
 
-    /// What a foot does at an instant.
+    /// The phase of a foot at an instant.
     pub fn phase_at(&self, foot: usize, instant: Instant) -> Phase {
         match instant {
             Instant::Sample(k) => self.phase[foot][k],
@@ -318,38 +263,36 @@ impl Layout {
         self.feet[foot].swings.iter().filter(|s| s.swing.middle() < time).count()
     }
 
-    /// A foot at time `k` in samples: its position, velocity or acceleration (in the space of the variables), with switches
-    /// at their nominal or frozen times.
+    /// A foot at time `k` in samples, or its velocity or acceleration (in the space of the variables), with switches at their nominal
+    /// or frozen times.
     pub fn foot_node(&self, foot: usize, k: f64, derivative: usize) -> LinearNode {
         let variables = &self.feet[foot];
         let swing = variables.swings.iter().position(|s| s.swing.start < k && k < s.swing.end);
-        if let Some(j) = swing {
-            let s = variables.swings[j].swing;
-            let duration = s.end - s.start;
-            let mut node = self.swing_node(foot, j, (k - s.start) / duration, derivative);
-            let scale = (duration * self.time_step).powi(-(derivative as i32));
-            node.terms.iter_mut().for_each(|term| term.1 *= scale);
-            return node;
+        match swing {
+            Some(j) => {
+                let s = variables.swings[j].swing;
+                let duration = s.end - s.start;
+                let mut node = self.swing_node(foot, j, (k - s.start) / duration, derivative);
+                let scale = (duration * self.time_step).powi(-(derivative as i32));
+                node.terms.iter_mut().for_each(|term| term.1 *= scale);
+                node
+            }
+            None if derivative > 0 => LinearNode::default(),
+            None => variables.stances[self.stance_near(foot, k)].foothold.clone(),
         }
-        if derivative > 0 {
-            return LinearNode::default();
-        }
-        variables.stances[self.stance_near(foot, k)].foothold.clone()
     }
 
-    /// A foot at u ∈ [0, 1] of swing `j`, or a derivative with respect to u.
+    /// A foot at u ∈ [0, 1] of swing `j`, or its first or second derivative with respect to u.
     pub fn swing_node(&self, foot: usize, j: usize, u: f64, derivative: usize) -> LinearNode {
-        let weights = &clamped_cubic(SWING_INTERVALS, u)[derivative];
-        let variables = self.swing_variables(foot, j);
         let mut node = LinearNode::default();
-        for (c, &weight) in weights.iter().enumerate() {
-            node.push(variables[c.clamp(1, SWING_CONTROL_POINTS + 2) - 1], weight);
+        for (variable, weight) in self.swing_variables(foot, j).into_iter().zip(swing_basis(u)[derivative]) {
+            node.push(variable, weight);
         }
         node
     }
 
-    /// First variables of a swing's foothold, control points and next foothold.
-    fn swing_variables(&self, foot: usize, j: usize) -> [usize; SWING_CONTROL_POINTS + 2] {
+    /// The first variables of a swing's foothold, control points and next foothold.
+    fn swing_variables(&self, foot: usize, j: usize) -> [usize; SWING_POINTS] {
         let variables = &self.feet[foot];
         let first = variables.swings[j].control_points;
         std::array::from_fn(|c| match c {
@@ -359,7 +302,7 @@ impl Layout {
         })
     }
 
-    /// A foot at an instant, following its switches where these are variables.
+    /// A foot at an instant, as a function of its switches if these are variables.
     pub fn timed_foot(&self, foot: usize, instant: Instant) -> TimedNode {
         if let Phase::Swing(j) = self.phase_at(foot, instant)
             && let Some(lift_off) = self.feet[foot].swings[j].switches
@@ -369,11 +312,11 @@ impl Layout {
         TimedNode::given(self.foot_node(foot, instant.time(), 0))
     }
 
-    /// The force f̄ of a foot at sample `k`, if it may bear something there, following its switches where these are variables.
+    /// The force f̄ of a foot at sample `k`, if it may carry a load there, as a function of its switches if these are variables.
     pub fn timed_force(&self, foot: usize, k: usize) -> Option<TimedNode> {
         let (j, full) = self.force(foot, k)?;
         let swings = &self.feet[foot].swings;
-        // A ramp takes one sample, from the switch to two samples from it.
+        // The ramp takes one sample and starts one sample away from the switch.
         let before = j.checked_sub(1).map(|j| &swings[j]).filter(|s| (k as f64) < s.swing.span()[1] + 2.0);
         let after = swings.get(j).filter(|s| (k as f64) > s.swing.span()[0] - 2.0);
         Some(match (before.and_then(|s| s.switches), after.and_then(|s| s.switches)) {
@@ -383,24 +326,28 @@ impl Layout {
         })
     }
 
-    /// The force of a foot at sample `k`, if it is free there, and its stance. Where durations are optimized, ḡ.
+    /// The force of a foot at sample `k`, if there is one, and its stance. If durations are optimized, ḡ.
     pub fn force(&self, foot: usize, k: usize) -> Option<(usize, &LinearNode)> {
         let j = self.nearest_stance[foot][k];
         self.feet[foot].stances[j].force(k).map(|node| (j, node))
     }
 }
 
-/// How many pieces of about `spacing` samples make up `length`.
+/// Weights below this, relative to the scale of a derivative, are zero up to rounding.
+const CANCELLED: f64 = 1e-14;
+
+/// The number of pieces of about `spacing` samples in `length`.
 fn pieces(length: usize, spacing: usize) -> usize {
     ((length as f64 / spacing as f64).round() as usize).clamp(1, length)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::phase::Swing;
     use super::*;
 
     fn layout() -> Layout {
-        layout_of(KnotSpacing::FINE)
+        layout_of(KnotSpacing { base: 1, force: 1 })
     }
 
     fn layout_of(spacing: KnotSpacing) -> Layout {
@@ -415,7 +362,7 @@ mod tests {
     fn coarse_knots_are_interpolated() {
         let spacing = KnotSpacing { base: 3, force: 2 };
         let layout = layout_of(spacing);
-        // 20 samples in 7 intervals of the base; the stance of 4 samples has nodes at 0, 2 and, tied to zero, 4.
+        // 20 samples make 7 intervals of the base; the stance of 4 samples has nodes at 0, at 2 and, fixed at zero, at 4.
         assert_eq!((layout.base_intervals, layout.base_blocks), (7, 6));
         let stance = &layout.feet[0].stances[0];
         let first = stance.force(0).expect("the motion starts here").first();
@@ -423,7 +370,7 @@ mod tests {
         assert_eq!(stance.force(1).expect("inside").terms, [(first, 0.5), (second, 0.5)]);
         assert_eq!(stance.force(3).expect("inside").terms, [(second, 0.5)]);
         assert!(stance.force(4).is_none());
-        // A spline whose control points lie on a line is that line; its derivative is the slope.
+        // A spline whose control points are on a line is that line, and its derivative the slope.
         let mut x = vec![0.0; layout.variables];
         for block in 0..layout.base_blocks {
             x[6 * block] = block as f64;
@@ -447,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn each_variable_is_used_and_none_twice() {
+    fn each_variable_has_exactly_one_use() {
         let layout = layout();
         let mut used = vec![0; layout.variables];
         for node in &layout.base {
@@ -475,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn forces_are_tied_to_zero_at_switches_only() {
+    fn forces_are_zero_at_switches_only() {
         let layout = layout();
         assert!(layout.force(0, 0).is_some() && layout.force(0, 20).is_some());
         for k in [4, 5, 6, 7, 8] {

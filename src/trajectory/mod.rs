@@ -1,7 +1,7 @@
-//! The motion as splines: which foot stands when, and how every sampled quantity depends linearly on the variables.
+//! The motion as splines: which foot stands when, and every sampled quantity as a linear combination of the variables, the c of Eq. 1
+//! and the c̄ of Eq. 7.
 //!
-//! Everything here is the same for both formulations. Whether a node is a point of F or of ambient space is decided in
-//! [`crate::nlp::state`].
+//! The two formulations differ in [`space`] alone.
 
 pub mod gait;
 pub mod instant;
@@ -14,6 +14,7 @@ pub mod space;
 pub mod spaces;
 pub mod spline;
 pub mod switches;
+pub mod variables;
 
 pub use gait::Gait;
 pub use instant::Instant;

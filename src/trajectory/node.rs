@@ -2,27 +2,30 @@
 
 /// A sampled quantity: component d is the sum of `weight * x[variable + d]` over the terms.
 ///
-/// Where the weights depend on switches, `times` holds what the node's differential has besides the terms.
+/// If the weights depend on switches, `times` holds their part of the differential.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinearNode {
     /// (first variable, weight).
     pub terms: Vec<(usize, f64)>,
-    /// (switch, derivative of each of the three components with respect to it).
+    /// (switch, derivatives of the three components with respect to it).
     pub times: Vec<(usize, [f64; 3])>,
 }
 
+/// Weights below this are rounding errors.
+const NEGLIGIBLE: f64 = 1e-15;
+
 impl LinearNode {
-    /// A node that is a variable itself.
+    /// A node that equals variables.
     pub fn variable(variable: usize) -> Self {
         Self { terms: vec![(variable, 1.0)], times: Vec::new() }
     }
 
-    /// Its first variable; of a node that is a variable itself, that variable.
+    /// The first variable of its first term.
     pub fn first(&self) -> usize {
         self.terms[0].0
     }
 
-    /// Its value at x.
+    /// The value at x.
     pub fn value<const D: usize>(&self, x: &[f64]) -> [f64; D] {
         let mut y = [0.0; D];
         for &(variable, weight) in &self.terms {
@@ -36,7 +39,7 @@ impl LinearNode {
     /// The differential of component d: (variable, coefficient).
     #[inline]
     pub fn differential(&self, d: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
-        // By number and not chained: loops over it are the inner loops of every derivative, and compile to half the time.
+        // An index and not a chain of iterators: loops over it are the inner loops of every derivative and take half the time this way.
         let terms = self.terms.len();
         (0..terms + self.times.len()).map(move |n| match self.terms.get(n) {
             Some(&(variable, weight)) => (variable + d, weight),
@@ -44,9 +47,9 @@ impl LinearNode {
         })
     }
 
-    /// Adds a variable's share.
+    /// Adds `weight · x[variable + d]`. Weights that are zero up to rounding are dropped.
     pub fn push(&mut self, variable: usize, weight: f64) {
-        if weight.abs() < 1e-15 {
+        if weight.abs() < NEGLIGIBLE {
             return;
         }
         match self.terms.iter_mut().find(|(v, _)| *v == variable) {

@@ -1,42 +1,42 @@
-//! The phases of a foot: a stance, a swing.
+//! The phases of a foot: stance and swing.
 
-/// A time during which a foot stands, in samples.
+/// A phase in which a foot is on the ground; times in samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {
-    /// Touch-down (force zero, unless the motion starts here).
+    /// Touch-down. The force is zero then, unless the motion starts.
     pub start: f64,
-    /// Lift-off (force zero, unless the motion ends here).
+    /// Lift-off. The force is zero then, unless the motion ends.
     pub end: f64,
 }
 
-/// A time during which a foot moves, in samples; both ends belong to a stance as well.
+/// A phase in which a foot is in the air; times in samples. Both ends belong to a stance, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
     /// Lift-off.
     pub start: f64,
     /// Touch-down.
     pub end: f64,
-    /// How far lift-off and touch-down may move to either side; zero where they are given.
+    /// How far lift-off and touch-down may each move in either direction; zero if they are given.
     pub room: [f64; 2],
 }
 
 impl Swing {
-    /// With given ends.
+    /// A swing with given switches.
     pub fn given(start: f64, end: f64) -> Self {
         Self { start, end, room: [0.0; 2] }
     }
 
-    /// Whether its ends are variables.
+    /// Whether its switches are variables.
     pub fn is_free(&self) -> bool {
         self.room != [0.0; 2]
     }
 
-    /// The samples at which the foot moves, or may move, lie strictly between these.
+    /// The foot moves, or may move, strictly between these times.
     pub fn span(&self) -> [f64; 2] {
         [self.start - self.room[0], self.end + self.room[1]]
     }
 
-    /// Time between its nominal ends; forces before it belong to the stance before.
+    /// Halfway between its nominal switches. Forces before this time belong to the preceding stance, others to the following one.
     pub fn middle(&self) -> f64 {
         0.5 * (self.start + self.end)
     }

@@ -1,7 +1,7 @@
-//! Rotations: ZYX Euler angles, the projection 𝒫 onto SO(3) (Eq. 12), and their derivatives as rotation vectors.
+//! Rotations: ZYX Euler angles, the projection 𝒫 onto SO(3) of Eq. 12, and their derivatives as rotation vectors.
 //!
-//! A rotation R(y) that depends on parameters y has derivatives ∂R/∂y_d = \[w_d\]× R with rotation vectors w_d in the
-//! frame that R maps into, and second derivatives ∂²R/∂y_d∂y_e = (\[∂_e w_d\]× + \[w_d\]× \[w_e\]×) R.
+//! A rotation R(y) has first derivatives ∂R/∂y_d = \[w_d\]× R, with rotation vectors w_d in the frame that R maps to, and second
+//! derivatives ∂²R/∂y_d∂y_e = (\[∂_e w_d\]× + \[w_d\]× \[w_e\]×) R.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,15 +15,14 @@ pub fn skew_part(a: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(a[(2, 1)] - a[(1, 2)], a[(0, 2)] - a[(2, 0)], a[(1, 0)] - a[(0, 1)])
 }
 
-/// A rotation with the rotation vectors of its first derivatives (columns of `first`) and, when asked for, their own
-/// derivatives: `second[e]` has the columns ∂_e w_d.
+/// A rotation R(y) and its derivatives as rotation vectors.
 #[derive(Clone, Copy, Debug)]
 pub struct RotationJet<const D: usize> {
     /// R.
     pub rotation: Matrix3<f64>,
-    /// w_d as columns.
+    /// `first[d]` = w_d.
     pub first: [Vector3<f64>; D],
-    /// `second[e][d]` = ∂_e w_d.
+    /// `second[e][d]` = ∂_e w_d; zero where not computed.
     pub second: [[Vector3<f64>; D]; D],
 }
 
@@ -55,42 +54,52 @@ pub fn euler(theta: &Vector3<f64>) -> RotationJet<3> {
     }
 }
 
-/// θ = (roll, pitch, yaw) of a rotation.
+/// The Euler angles θ = (roll, pitch, yaw) of a rotation; the inverse of [`euler`].
 pub fn euler_angles(r: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(r[(2, 1)].atan2(r[(2, 2)]), (-r[(2, 0)]).clamp(-1.0, 1.0).asin(), r[(1, 0)].atan2(r[(0, 0)]))
 }
 
-/// 𝒫(J), the rotation nearest to J (Eq. 12), for det J > 0: the limit of X ← ½(γX + X⁻ᵀ/γ).
+/// Determinants up to this are projected by the singular value decomposition.
+const LEAST_DETERMINANT: f64 = 1e-12;
+/// The polar iteration converges quadratically, in fewer steps than this.
+const POLAR_ITERATIONS: usize = 20;
+/// Squared norm of a change at which the polar iteration has converged to rounding.
+const POLAR_TOLERANCE: f64 = 1e-26;
+
+/// Eq. 12: 𝒫(J), the rotation nearest to J.
 ///
-/// For det J ≤ 0, which no accepted map has but an infeasible iterate may meet outside the box, the SVD formula
-/// U diag(1, 1, det UVᵀ) Vᵀ.
+/// For det J ≤ 0, which an infeasible iterate may meet outside the box, it is U diag(1, 1, det UVᵀ) Vᵀ with the singular value
+/// decomposition J = U Σ Vᵀ.
 pub fn project_to_rotation(j: &Matrix3<f64>) -> Matrix3<f64> {
     let det = j.determinant();
-    if det <= 1e-12 {
-        let svd = j.svd(true, true);
-        if let (Some(u), Some(v_t)) = (svd.u, svd.v_t) {
-            let sign = (u * v_t).determinant().signum();
-            return u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-        }
-        return Matrix3::identity();
-    }
-    let mut x = j / det.cbrt();
-    for _ in 0..20 {
+    if det <= LEAST_DETERMINANT { svd_rotation(j) } else { polar_rotation(j / det.cbrt()) }
+}
+
+fn svd_rotation(j: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = j.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    let sign = (u * v_t).determinant().signum();
+    u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t
+}
+
+/// The rotation of the polar decomposition of X, det X > 0: the limit of X ← ½(γX + X⁻ᵀ/γ).
+fn polar_rotation(mut x: Matrix3<f64>) -> Matrix3<f64> {
+    for _ in 0..POLAR_ITERATIONS {
         let Some(inverse) = x.try_inverse() else { break };
         let inverse_t = inverse.transpose();
         let gamma = (inverse_t.norm() / x.norm()).sqrt();
         let next = 0.5 * (gamma * x + inverse_t / gamma);
         let change = (next - x).norm_squared();
         x = next;
-        if change < 1e-26 {
+        if change < POLAR_TOLERANCE {
             break;
         }
     }
     x
 }
 
-/// 𝒫(J(y)) for parameters y of which J depends through `first[d]` = ∂_d J and `second[e][d]` = ∂_e ∂_d J (corollary IV.1,
-/// with the sign of the projection mended).
+/// 𝒫(J(y)) of Eq. 12 and its derivatives, given `first[d]` = ∂_d J and `second[e][d]` = ∂_e ∂_d J. Without `second`, the second
+/// derivatives are zero. (Corollary IV.1, with the sign of the projection corrected.)
 ///
 /// With J = P H: (tr H 1 − H) ω_d = skew_part(Pᵀ ∂_d J) and ∂_d P = P \[ω_d\]× = \[P ω_d\]× P.
 pub fn projection(
@@ -125,7 +134,7 @@ pub fn projection(
     jet
 }
 
-/// The product 𝒫(y_0..2) E(y_3..5) of a projection and an Euler rotation, as a function of all six parameters.
+/// The product 𝒫 E of Eq. 13 as a function of six parameters: three of the projection, then three of the Euler rotation.
 pub fn compose(p: &RotationJet<3>, e: &RotationJet<3>) -> RotationJet<6> {
     let zero = Vector3::zeros();
     let mut jet = RotationJet { rotation: p.rotation * e.rotation, first: [zero; 6], second: [[zero; 6]; 6] };

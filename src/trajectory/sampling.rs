@@ -1,4 +1,4 @@
-//! The motion at any time, in ambient space, with exact velocities and accelerations: what plans are made of.
+//! The motion at any time, in ambient space, with exact velocities and accelerations.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -12,7 +12,7 @@ use crate::warp::Order;
 pub struct BaseMotion {
     /// p, m.
     pub position: Vector3<f64>,
-    /// R, body to world.
+    /// R, base to world.
     pub rotation: Matrix3<f64>,
     /// ṗ, m/s.
     pub velocity: Vector3<f64>,
@@ -27,7 +27,7 @@ pub struct BaseMotion {
 }
 
 impl BaseMotion {
-    /// R as a unit quaternion w, x, y, z; of the two that it may be, the one nearer to `near`.
+    /// R as a unit quaternion w, x, y, z. Of the two that represent R, the one closer to `near`.
     pub fn quaternion_wxyz(&self, near: [f64; 4]) -> [f64; 4] {
         let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation));
         let q = [q.w, q.i, q.j, q.k];
@@ -41,13 +41,13 @@ impl BaseMotion {
 pub struct FootMotion {
     /// p_i, m.
     pub position: Vector3<f64>,
-    /// m/s.
+    /// ṗ_i, m/s.
     pub velocity: Vector3<f64>,
-    /// m/s².
+    /// p̈_i, m/s².
     pub acceleration: Vector3<f64>,
-    /// f_i, in the unit of the variables (m g).
+    /// f_i = J f̄_i, in the unit of the variables (m g).
     pub force: Vector3<f64>,
-    /// In stance.
+    /// Whether the foot is in a stance.
     pub contact: bool,
     /// p̄_i.
     pub warped_position: Vector3<f64>,
@@ -55,14 +55,14 @@ pub struct FootMotion {
     pub warped_force: Vector3<f64>,
 }
 
-/// Velocity and acceleration of φ(x̄(t)): J x̄̇ and J x̄̈ + (∂J x̄̇) x̄̇.
+/// The velocity and the acceleration of φ(x̄(t)): J x̄̇ and J x̄̈ + (∂J x̄̇) x̄̇.
 fn pushed(point: &PointJet, rate: &Vector3<f64>, second: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let turned: Matrix3<f64> = (0..3).map(|d| point.first[d] * rate[d]).sum();
-    (point.jacobian * rate, point.jacobian * second + turned * rate)
+    let jacobian_rate: Matrix3<f64> = (0..3).map(|d| point.first[d] * rate[d]).sum();
+    (point.jacobian * rate, point.jacobian * second + jacobian_rate * rate)
 }
 
 /// ω = Σ w_d ẏ_d and ω̇ = Σ w_d ÿ_d + Σ ∂_e w_d ẏ_e ẏ_d.
-fn turned(turn: &RotationJet<6>, rate: &[f64; 6], second: &[f64; 6]) -> (Vector3<f64>, Vector3<f64>) {
+fn angular(turn: &RotationJet<6>, rate: &[f64; 6], second: &[f64; 6]) -> (Vector3<f64>, Vector3<f64>) {
     let mut velocity = Vector3::zeros();
     let mut acceleration = Vector3::zeros();
     for d in 0..6 {
@@ -82,7 +82,7 @@ pub fn base(layout: &Layout, space: &Space, x: &[f64], k: f64) -> BaseMotion {
     let (point, turn) = space.pose(&y, true);
     let head = |v: &[f64; 6]| Vector3::new(v[0], v[1], v[2]);
     let (velocity, acceleration) = pushed(&point, &head(&rate), &head(&second));
-    let (angular_velocity, angular_acceleration) = turned(&turn, &rate, &second);
+    let (angular_velocity, angular_acceleration) = angular(&turn, &rate, &second);
     BaseMotion {
         position: point.position,
         rotation: turn.rotation,
@@ -94,7 +94,7 @@ pub fn base(layout: &Layout, space: &Space, x: &[f64], k: f64) -> BaseMotion {
     }
 }
 
-/// A foot at time `k` in samples, switches given or frozen. Forces are linear between samples.
+/// A foot at time `k` in samples, with given or frozen switches. Forces are linear between samples.
 pub fn foot(layout: &Layout, space: &Space, x: &[f64], foot: usize, k: f64) -> FootMotion {
     let value = |derivative: usize| Vector3::from(layout.foot_node(foot, k, derivative).value::<3>(x));
     let (y, rate, second) = (value(0), value(1), value(2));
@@ -107,9 +107,9 @@ pub fn foot(layout: &Layout, space: &Space, x: &[f64], foot: usize, k: f64) -> F
     };
     let before = (k.max(0.0) as usize).min(layout.intervals);
     let after = (before + 1).min(layout.intervals);
-    let share = k - before as f64;
+    let fraction = k - before as f64;
     let warped_force =
-        if contact { at(before) * (1.0 - share) + at(after) * share } else { Vector3::zeros() };
+        if contact { at(before) * (1.0 - fraction) + at(after) * fraction } else { Vector3::zeros() };
     FootMotion {
         position: point.position,
         velocity,

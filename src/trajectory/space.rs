@@ -1,4 +1,4 @@
-//! The space that the variables live in: F, pushed forward by φ, or ambient space itself (φ = identity).
+//! The space of the variables: F, pushed forward by φ, or the ambient space itself (φ = identity).
 
 use std::sync::Arc;
 
@@ -7,16 +7,16 @@ use nalgebra::{Matrix3, Vector3};
 use super::rotation::{self, RotationJet};
 use crate::warp::{Order, WarpMap};
 
-/// Where the variables live.
+/// The space of the variables.
 #[derive(Clone, Debug)]
 pub enum Space {
-    /// The baseline: variables are ambient quantities.
+    /// Ambient space, in the paper's baseline, Eq. 1.
     Direct,
-    /// Variables are pulled back by φ (Eq. 7).
+    /// F, in the paper's method, Eq. 7: positions are φ of the variables.
     Warped(Arc<WarpMap>),
 }
 
-/// φ at a point with its derivatives as matrices.
+/// φ and its derivatives at a point, as matrices.
 #[derive(Clone, Copy, Debug)]
 pub struct PointJet {
     /// φ(x̄), m.
@@ -29,14 +29,8 @@ pub struct PointJet {
     pub second: [[Matrix3<f64>; 3]; 3],
 }
 
-/// Index into (xx, xy, xz, yy, yz, zz).
-const SECOND: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-/// Index into (xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz).
-const THIRD: [[[usize; 3]; 3]; 3] =
-    [[[0, 1, 2], [1, 3, 4], [2, 4, 5]], [[1, 3, 4], [3, 6, 7], [4, 7, 8]], [[2, 4, 5], [4, 7, 8], [5, 8, 9]]];
-
 impl Space {
-    /// φ and as many of its derivatives as asked for; the rest are zero.
+    /// φ and its derivatives up to `order`; the others are zero.
     pub fn jet(&self, x: &Vector3<f64>, order: Order) -> PointJet {
         let zero = Matrix3::zeros();
         match self {
@@ -48,25 +42,26 @@ impl Space {
             },
             Space::Warped(map) => {
                 let jet = map.jet([x.x, x.y, x.z], order);
+                let matrix = |rows: [[f64; 3]; 3]| Matrix3::from_fn(|c, d| rows[c][d]);
                 PointJet {
                     position: Vector3::from(jet.position),
-                    jacobian: Matrix3::from_fn(|c, d| jet.jacobian[c][d]),
-                    first: std::array::from_fn(|e| Matrix3::from_fn(|c, d| jet.second[c][SECOND[e][d]])),
+                    jacobian: matrix(jet.jacobian),
+                    first: std::array::from_fn(|e| matrix(jet.jacobian_derivative(e))),
                     second: std::array::from_fn(|f| {
-                        std::array::from_fn(|e| Matrix3::from_fn(|c, d| jet.third[c][THIRD[f][e][d]]))
+                        std::array::from_fn(|e| matrix(jet.jacobian_second_derivative(f, e)))
                     }),
                 }
             }
         }
     }
 
-    /// Position and orientation of a body whose variables are (x̄, θ̄): φ(x̄) and 𝒫(J(x̄)) R(θ̄) (Eq. 13).
+    /// Eq. 13: the position φ(x̄) and the orientation 𝒫(J(x̄)) R(θ̄) of a body with variables (x̄, θ̄).
     ///
-    /// `curved` asks for the second derivatives of the rotation as well.
-    pub fn pose(&self, y: &[f64; 6], curved: bool) -> (PointJet, RotationJet<6>) {
-        let point =
-            self.jet(&Vector3::new(y[0], y[1], y[2]), if curved { Order::Third } else { Order::Second });
-        let turn = rotation::euler(&Vector3::new(y[3], y[4], y[5]));
+    /// The second derivatives of the rotation are zero unless `with_second`.
+    pub fn pose(&self, y: &[f64; 6], with_second: bool) -> (PointJet, RotationJet<6>) {
+        let order = if with_second { Order::Third } else { Order::Second };
+        let point = self.jet(&Vector3::new(y[0], y[1], y[2]), order);
+        let euler = rotation::euler(&Vector3::new(y[3], y[4], y[5]));
         let frame = match self {
             Space::Direct => RotationJet {
                 rotation: Matrix3::identity(),
@@ -74,15 +69,10 @@ impl Space {
                 second: [[Vector3::zeros(); 3]; 3],
             },
             Space::Warped(_) => {
-                rotation::projection(&point.jacobian, &point.first, curved.then_some(&point.second))
+                rotation::projection(&point.jacobian, &point.first, with_second.then_some(&point.second))
             }
         };
-        (point, rotation::compose(&frame, &turn))
-    }
-
-    /// Whether coordinate `d` of a point's variables moves component `c` of its ambient position.
-    pub fn couples(&self, c: usize, d: usize) -> bool {
-        c == d || self.is_warped()
+        (point, rotation::compose(&frame, &euler))
     }
 
     /// Whether φ is not the identity.

@@ -1,80 +1,70 @@
-//! Cubic B-spline bases in one variable: uniform (the base) and clamped (swinging feet).
+//! The clamped cubic B-spline of a swinging foot. (That of the base is uniform, see `bspline.rs`.)
 
-/// Number of free control points of a swing; the outer two on each side are the footholds.
+/// Number of free control points of a swing. The two on each side of them are at the footholds.
 pub const SWING_CONTROL_POINTS: usize = 3;
-/// Knot intervals of a swing.
+/// Number of knot intervals of a swing.
 pub const SWING_INTERVALS: usize = SWING_CONTROL_POINTS + 1;
+/// Number of distinct control points of a swing: a foothold, the free ones, the next foothold.
+pub const SWING_POINTS: usize = SWING_CONTROL_POINTS + 2;
 
-/// The four weights of a uniform cubic B-spline and their first and second derivatives at u ∈ [0, 1] of a knot interval
-/// (in units of the knot spacing).
-pub fn uniform_cubic(u: f64) -> [[f64; 4]; 3] {
-    let v = 1.0 - u;
-    [
-        [
-            v * v * v / 6.0,
-            (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0,
-            (-3.0 * u * u * u + 3.0 * u * u + 3.0 * u + 1.0) / 6.0,
-            u * u * u / 6.0,
-        ],
-        [-v * v / 2.0, (9.0 * u * u - 12.0 * u) / 6.0, (-9.0 * u * u + 6.0 * u + 3.0) / 6.0, u * u / 2.0],
-        [v, 3.0 * u - 2.0, 1.0 - 3.0 * u, u],
-    ]
+/// The basis of a swing at u ∈ [0, 1], and its first and second derivatives with respect to u, by distinct control point. The two
+/// basis functions of each foothold are added up, so that the foot lifts off and touches down with zero velocity.
+pub fn swing_basis(u: f64) -> [[f64; SWING_POINTS]; 3] {
+    clamped_cubic(u).map(|b| [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]])
 }
 
-/// Values and first and second derivatives, with respect to u ∈ [0, 1], of all `intervals + 3` basis functions of a cubic
-/// B-spline on equal intervals whose end knots are fourfold, so that it starts and ends at its outer control points.
-pub fn clamped_cubic(intervals: usize, u: f64) -> [Vec<f64>; 3] {
+/// All basis functions of a cubic B-spline at u ∈ [0, 1], and their first and second derivatives. The [`SWING_INTERVALS`] knot
+/// intervals are equal and the end knots fourfold, so that the spline starts and ends at its outer control points.
+fn clamped_cubic(u: f64) -> [Vec<f64>; 3] {
+    let intervals = SWING_INTERVALS;
     let knots: Vec<f64> =
         (0..intervals + 7).map(|i| (i.saturating_sub(3).min(intervals)) as f64 / intervals as f64).collect();
     let u = u.clamp(0.0, 1.0);
     let span = 3 + ((u * intervals as f64) as usize).min(intervals - 1);
-    // Cox–de Boor from degree 0 to 3; `levels[p]` holds all functions of degree p.
-    let mut levels: Vec<Vec<f64>> = vec![vec![0.0; knots.len() - 1]];
-    levels[0][span] = 1.0;
-    for p in 1..=3 {
-        let lower = &levels[p - 1];
-        let level = (0..knots.len() - 1 - p)
-            .map(|i| {
-                let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
-                ratio(u - knots[i], knots[i + p] - knots[i]) * lower[i]
-                    + ratio(knots[i + p + 1] - u, knots[i + p + 1] - knots[i + 1]) * lower[i + 1]
-            })
-            .collect();
-        levels.push(level);
-    }
-    // N'_{i,p} = p (N_{i,p-1}/(k_{i+p} - k_i) - N_{i+1,p-1}/(k_{i+p+1} - k_{i+1})).
-    let derivative = |lower: &[f64], p: usize| -> Vec<f64> {
-        (0..knots.len() - 1 - p)
-            .map(|i| {
-                let term = |j: usize| {
-                    let width = knots[j + p] - knots[j];
-                    if width > 0.0 { lower[j] / width } else { 0.0 }
-                };
-                p as f64 * (term(i) - term(i + 1))
-            })
-            .collect()
-    };
-    let first = derivative(&levels[2], 3);
-    let second = derivative(&derivative(&levels[1], 2), 3);
-    [levels.pop().expect("four levels"), first, second]
+    let mut constant = vec![0.0; knots.len() - 1];
+    constant[span] = 1.0;
+    let linear = raised(&knots, 1, &constant, u);
+    let quadratic = raised(&knots, 2, &linear, u);
+    let cubic = raised(&knots, 3, &quadratic, u);
+    let first = differentiated(&knots, 3, &quadratic);
+    let second = differentiated(&knots, 3, &differentiated(&knots, 2, &linear));
+    [cubic, first, second]
 }
 
-/// The spline of a swing, collapsed onto (foothold, three control points, next foothold): each foothold is the outer two
-/// control points of its side. A polynomial a knot interval, so that it can be evaluated without allocation.
+/// The basis functions of degree `p` from those of degree p − 1 (Cox–de Boor).
+fn raised(knots: &[f64], p: usize, lower: &[f64], u: f64) -> Vec<f64> {
+    let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+    (0..knots.len() - 1 - p)
+        .map(|i| {
+            ratio(u - knots[i], knots[i + p] - knots[i]) * lower[i]
+                + ratio(knots[i + p + 1] - u, knots[i + p + 1] - knots[i + 1]) * lower[i + 1]
+        })
+        .collect()
+}
+
+/// The derivatives of the basis functions of degree `p` from (derivatives of) those of degree p − 1:
+/// N'_{i,p} = p (N_{i,p−1}/(k_{i+p} − k_i) − N_{i+1,p−1}/(k_{i+p+1} − k_{i+1})).
+fn differentiated(knots: &[f64], p: usize, lower: &[f64]) -> Vec<f64> {
+    let term = |j: usize| {
+        let width = knots[j + p] - knots[j];
+        if width > 0.0 { lower[j] / width } else { 0.0 }
+    };
+    (0..knots.len() - 1 - p).map(|i| p as f64 * (term(i) - term(i + 1))).collect()
+}
+
+/// [`swing_basis`] as a polynomial for each knot interval, which is fast to evaluate.
 #[derive(Clone, Debug)]
 pub struct SwingBasis {
-    /// `coefficients[interval][m][power]` of the local time, in units of u.
-    coefficients: [[[f64; 4]; 5]; SWING_INTERVALS],
+    /// `coefficients[interval][m][power]` of the distance in u from the start of the interval.
+    coefficients: [[[f64; 4]; SWING_POINTS]; SWING_INTERVALS],
 }
 
 impl SwingBasis {
     /// From the values and derivatives at the knots.
     pub fn new() -> Self {
         let width = 1.0 / SWING_INTERVALS as f64;
-        let knots: Vec<[[f64; 5]; 3]> = (0..=SWING_INTERVALS)
-            .map(|i| clamped_cubic(SWING_INTERVALS, i as f64 * width))
-            .map(|levels| levels.map(|b| [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]]))
-            .collect();
+        let knots: Vec<[[f64; SWING_POINTS]; 3]> =
+            (0..=SWING_INTERVALS).map(|i| swing_basis(i as f64 * width)).collect();
         Self {
             coefficients: std::array::from_fn(|i| {
                 let (left, right) = (&knots[i], &knots[i + 1]);
@@ -86,12 +76,12 @@ impl SwingBasis {
         }
     }
 
-    /// The five weights and their first and second derivatives at u, which counts as 0 before the swing and as 1 after it.
-    pub fn at(&self, u: f64) -> [[f64; 5]; 3] {
+    /// The weights and their first and second derivatives at u, which is clamped to [0, 1].
+    pub fn at(&self, u: f64) -> [[f64; SWING_POINTS]; 3] {
         let u = u.clamp(0.0, 1.0);
         let i = ((u * SWING_INTERVALS as f64) as usize).min(SWING_INTERVALS - 1);
         let s = u - i as f64 / SWING_INTERVALS as f64;
-        let mut weights = [[0.0; 5]; 3];
+        let mut weights = [[0.0; SWING_POINTS]; 3];
         for (m, [c0, c1, c2, c3]) in self.coefficients[i].into_iter().enumerate() {
             weights[0][m] = c0 + s * (c1 + s * (c2 + s * c3));
             weights[1][m] = c1 + s * (2.0 * c2 + s * 3.0 * c3);
@@ -112,23 +102,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_bases_sum_to_one_and_match_differences() {
-        for i in 0..=20 {
-            let u = f64::from(i) / 20.0;
-            let b = uniform_cubic(u);
-            assert!((b[0].iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            let e = 1e-6;
-            let (p, m) = (uniform_cubic(u + e), uniform_cubic(u - e));
-            for k in 0..4 {
-                assert!(((p[0][k] - m[0][k]) / (2.0 * e) - b[1][k]).abs() < 1e-8);
-                assert!(((p[1][k] - m[1][k]) / (2.0 * e) - b[2][k]).abs() < 1e-8);
-            }
-        }
+    fn the_clamped_basis_sums_to_one_and_its_derivatives_match_differences() {
         for i in 1..40 {
             let u = f64::from(i) / 40.0 + 0.003;
             let e = 1e-6;
-            let b = clamped_cubic(4, u);
-            let (p, m) = (clamped_cubic(4, u + e), clamped_cubic(4, u - e));
+            let b = clamped_cubic(u);
+            let (p, m) = (clamped_cubic(u + e), clamped_cubic(u - e));
             assert_eq!(b[0].len(), 7);
             assert!((b[0].iter().sum::<f64>() - 1.0).abs() < 1e-13);
             for k in 0..7 {
@@ -139,16 +118,15 @@ mod tests {
     }
 
     #[test]
-    fn the_collapsed_basis_is_the_clamped_one() {
+    fn the_polynomials_are_the_basis() {
         let basis = SwingBasis::new();
         for i in 0..=40 {
             let u = f64::from(i) / 40.0;
-            let (short, long) = (basis.at(u), clamped_cubic(SWING_INTERVALS, u));
+            let (found, expected) = (basis.at(u), swing_basis(u));
             for derivative in 0..3 {
-                let b = &long[derivative];
-                let expected = [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]];
-                for m in 0..5 {
-                    assert!((short[derivative][m] - expected[m]).abs() < 1e-11, "u {u}, {derivative}, {m}");
+                for m in 0..SWING_POINTS {
+                    let error = found[derivative][m] - expected[derivative][m];
+                    assert!(error.abs() < 1e-11, "u {u}, {derivative}, {m}");
                 }
             }
         }
@@ -156,9 +134,9 @@ mod tests {
     }
 
     #[test]
-    fn a_clamped_spline_starts_and_ends_at_rest_when_its_outer_points_coincide() {
+    fn a_clamped_spline_starts_and_ends_at_rest_if_its_outer_points_coincide() {
         for (u, outer) in [(0.0, [0, 1]), (1.0, [5, 6])] {
-            let b = clamped_cubic(4, u);
+            let b = clamped_cubic(u);
             let inner: f64 =
                 (0..7).filter(|k| !outer.contains(k)).map(|k| b[0][k].abs() + b[1][k].abs()).sum();
             assert!(inner < 1e-14, "value and velocity depend on the outer two points alone");

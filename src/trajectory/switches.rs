@@ -1,114 +1,138 @@
-//! Optimized phase durations: lift-off and touch-down as variables, and what depends on them.
+//! Optimized phase durations: lift-off and touch-down as variables, and the nodes that depend on them.
 //!
-//! The switches a (lift-off) and b (touch-down) of each swing are variables, in samples; so the phases of a foot sum to the
-//! horizon by construction. Each may move within a room around its nominal time, small enough that a sample depends on one
-//! swing only, and its force on one switch only: the sparsity pattern stays fixed and local.
+//! The switches a (lift-off) and b (touch-down) of each swing are variables, in samples, so the phases of a foot sum to the horizon by
+//! construction. Each switch may move within some room around its nominal time. The room is small enough for a sample to depend on
+//! one swing only, and for its force to depend on one switch only, so that the sparsity pattern is fixed and local.
 //!
 //! ```text
-//!   foot at sample k:   p̄_k = Σ_m c̄_m B_m(u),  u = clamp((k − a)/(b − a), 0, 1);   B_m collapsed onto
-//!                       foothold, three control points, next foothold: it stands on these at u = 0 and u = 1
+//!   foot at sample k:   p̄_k = Σ_m c̄_m B_m(u),  u = clamp((k − a)/(b − a), 0, 1),   with c̄ the foothold, the control points and
+//!                       the next foothold: the foot stands on a foothold at u = 0 and at u = 1
 //!   force at sample k:  f̄_k = σ ḡ_k,  σ = ramp(k − 1 − b) after touch-down, ramp(a − k − 1) before lift-off
 //! ```
 //!
-//! A force at k acts from k − 1 to k + 1, for it is linear between samples. σ is zero unless all of that lies within the
-//! stance, so that a foot never bears anything while it moves, and forces stay linear between samples: Newton's law holds
-//! there as it does with given durations. ḡ obeys the cone and the limits of the normal force, whatever σ is, and then so
-//! does f̄.
+//! Forces are linear between samples, so a force at k acts from k − 1 to k + 1. The activation σ is zero unless all of that time is
+//! within the stance. Therefore a foot never carries a load while it moves, and forces stay linear between samples, so that Newton's
+//! law holds there as it does with given durations. ḡ obeys the friction cone and the limits of the normal force for any σ, and so
+//! f̄ does, too.
 
 use std::ops::Range;
 
 use super::node::LinearNode;
 use super::phase::Swing;
-use super::spline::SwingBasis;
+use super::spline::{SWING_POINTS, SwingBasis};
 
-/// No switch moves further than this from its nominal time, s.
+/// Greatest distance of a switch from its nominal time, s.
 const FARTHEST: f64 = 0.15;
-/// A swing takes at least so many time steps, whatever its bounds: its path is to be seen at the samples.
+/// Shortest swing, in time steps: with fewer, the samples do not capture its path.
 pub const SHORTEST_SWING: f64 = 3.0;
-/// Samples of a stance that both of its switches leave alone: so wide are two ramps.
+/// Samples of a stance that neither of its switches may enter: the width of two ramps.
 const CORE: f64 = 4.0;
-/// Samples of the first or last stance that its only switch leaves alone: the robot rests there on its own force.
+/// Samples of the first or last stance that its only switch may not enter: the robot is at rest there.
 const END_CORE: f64 = 2.0;
-/// The guess has lift-off and touch-down so many samples inside the nominal swing, within their rooms. The swing is then a
-/// time step shorter and each foot bears something at one sample more. A force that the guess leaves out cannot tell what it
-/// would be worth, for σ is flat where it is zero; one too many is given up easily. Rippled, medium: the cost falls from
-/// 28.9 to 20.6 from here, and not at all from half a sample inside on both sides.
+/// How far inside the nominal swing the guess has lift-off and touch-down, in samples, room permitting. The swing is then shorter by a
+/// time step or more, and the foot carries a load at one sample more. Because σ is flat at zero, the optimizer cannot see the benefit
+/// of a force that the guess leaves out, but it easily drops a superfluous one. Rippled, medium: the cost falls from 28.9 to 20.6
+/// from this guess, and not at all from half a sample inside on both sides.
 const GUESS_SHIFT: [f64; 2] = [1.25, 0.25];
-/// Least room of a switch that is worth having, in samples.
+/// Greatest fraction of its room that the guess shifts a switch by, so that it starts inside its bounds.
+const GUESS_FRACTION: f64 = 0.9;
+/// Least room of a switch, in samples: less would change no force or path noticeably.
 const LEAST_ROOM: f64 = 0.5;
-/// Switches nearer to a sample than this, in samples, are taken to lie on it.
+/// Switches this close to a sample, in samples, count as being on it.
 const ON_SAMPLE: f64 = 1e-6;
+/// Tolerance for durations given in decimal, s.
+const ROUNDING: f64 = 1e-9;
 
-/// The sample that a time lies on, up to rounding; otherwise the time itself.
+/// The sample at a time, if there is one up to rounding; otherwise the time itself.
 pub fn snapped(time: f64) -> f64 {
     if (time - time.round()).abs() < ON_SAMPLE { time.round() } else { time }
 }
 
-/// Gives the switches of one foot room to move, or says why they have none. `bounds` in s.
+/// Gives the switches of one foot room to move. `bounds` on the duration of a phase in s.
+///
+/// # Errors
+/// The reason, in words, if the phases and the bounds leave no room.
 pub(super) fn make_room(
     swings: &mut [Swing],
     intervals: usize,
     step: f64,
     bounds: [f64; 2],
 ) -> Result<(), String> {
-    let phases = 2 * swings.len() + 1;
-    let horizon = intervals as f64 * step;
-    if phases as f64 * bounds[0] > horizon {
-        return Err(format!(
-            "{phases} phases of at least {} s (gait.duration_bounds) do not fit into the horizon of {horizon} s; lower the bound, lengthen the horizon or gait.cycle",
-            bounds[0]
-        ));
+    let durations = phase_durations(swings, intervals);
+    check_horizon(durations.len(), intervals as f64 * step, bounds)?;
+    for n in 0..durations.len() {
+        check_duration(n, &durations, step, bounds)?;
     }
-    let edges: Vec<f64> = std::iter::once(0.0)
-        .chain(swings.iter().flat_map(|s| [s.start, s.end]))
-        .chain([intervals as f64])
-        .collect();
-    for (n, pair) in edges.windows(2).enumerate() {
-        let duration = (pair[1] - pair[0]) * step;
-        // The first and the last stance include standing before and after the walk.
-        let most = if n == 0 || n + 1 == phases { f64::INFINITY } else { bounds[1] };
-        let name = if n % 2 == 0 { "stance" } else { "swing" };
-        if duration < bounds[0] - 1e-9 || duration > most + 1e-9 {
-            return Err(format!(
-                "the {name} of {duration:.3} s that the gait begins with is not within gait.duration_bounds = [{}, {}] s; widen them, or change gait.cycle or gait.duty",
-                bounds[0], bounds[1]
-            ));
-        }
-        let shortest = SHORTEST_SWING * step;
-        if n % 2 == 1 && (duration < shortest - 1e-9 || bounds[1] < shortest) {
-            return Err(format!(
-                "a swing takes at least three time steps, {shortest:.3} s, but the gait begins with {duration:.3} s and gait.duration_bounds allow up to {} s; lower the time_step, or lengthen the swing",
-                bounds[1]
-            ));
-        }
-    }
-    let count = swings.len();
     for (j, swing) in swings.iter_mut().enumerate() {
-        // The stances before and after, and what they leave to this switch.
-        let [before, own, after] = [2 * j, 2 * j + 1, 2 * j + 2].map(|n| edges[n + 1] - edges[n]);
-        let left = if j == 0 { before - END_CORE } else { 0.5 * (before - CORE) };
-        let right = if j + 1 == count { after - END_CORE } else { 0.5 * (after - CORE) };
-        let most = (0.5 * (own - 1.0)).min(FARTHEST / step);
-        swing.room = [left.min(most), right.min(most)];
-        if swing.room.iter().any(|&room| room < LEAST_ROOM) {
-            return Err(format!(
-                "between a stance of {:.3} s, a swing of {:.3} s and a stance of {:.3} s no switch has room to move, with a time_step of {step} s; lower the time_step",
-                before * step,
-                own * step,
-                after * step
-            ));
-        }
+        swing.room = room(j, &durations, step)?;
     }
     Ok(())
 }
 
-/// Lift-off and touch-down to start from, in samples.
+/// The nominal durations of the phases, stance first, in samples.
+fn phase_durations(swings: &[Swing], intervals: usize) -> Vec<f64> {
+    let mut switches = vec![0.0];
+    switches.extend(swings.iter().flat_map(|s| [s.start, s.end]));
+    switches.push(intervals as f64);
+    switches.windows(2).map(|pair| pair[1] - pair[0]).collect()
+}
+
+fn check_horizon(phases: usize, horizon: f64, [least, _]: [f64; 2]) -> Result<(), String> {
+    if phases as f64 * least > horizon {
+        return Err(format!(
+            "{phases} phases of at least {least} s (gait.duration_bounds) do not fit into the horizon of {horizon} s; lower the bound, or lengthen the horizon or gait.cycle"
+        ));
+    }
+    Ok(())
+}
+
+/// Whether the nominal duration of phase n obeys its bounds.
+fn check_duration(n: usize, durations: &[f64], step: f64, [least, most]: [f64; 2]) -> Result<(), String> {
+    let duration = durations[n] * step;
+    let swings = n % 2 == 1;
+    // The first and the last stance include standing before and after the walk.
+    let at_end = n == 0 || n + 1 == durations.len();
+    if duration < least - ROUNDING || (duration > most + ROUNDING && !at_end) {
+        let name = if swings { "swing" } else { "stance" };
+        return Err(format!(
+            "the {name} of {duration:.3} s that the gait starts from is not within gait.duration_bounds = [{least}, {most}] s; widen them, or change gait.cycle or gait.duty"
+        ));
+    }
+    let shortest = SHORTEST_SWING * step;
+    if swings && (duration < shortest - ROUNDING || most < shortest) {
+        return Err(format!(
+            "a swing takes at least three time steps, {shortest:.3} s, but that of the gait takes {duration:.3} s and gait.duration_bounds allow up to {most} s; lower the time_step, or lengthen the swing"
+        ));
+    }
+    Ok(())
+}
+
+/// The room of the switches of swing j, in samples: as much as its neighbors in time leave.
+fn room(j: usize, durations: &[f64], step: f64) -> Result<[f64; 2], String> {
+    let [before, own, after] = [2 * j, 2 * j + 1, 2 * j + 2].map(|n| durations[n]);
+    let left = if j == 0 { before - END_CORE } else { 0.5 * (before - CORE) };
+    let right = if 2 * j + 3 == durations.len() { after - END_CORE } else { 0.5 * (after - CORE) };
+    // At least one sample of the swing itself remains.
+    let most = (0.5 * (own - 1.0)).min(FARTHEST / step);
+    let room = [left.min(most), right.min(most)];
+    if room.iter().any(|&room| room < LEAST_ROOM) {
+        return Err(format!(
+            "between a stance of {:.3} s, a swing of {:.3} s and a stance of {:.3} s no switch has room to move with a time_step of {step} s; lower the time_step",
+            before * step,
+            own * step,
+            after * step
+        ));
+    }
+    Ok(room)
+}
+
+/// The guess of lift-off and touch-down, in samples.
 pub fn guessed(swing: &Swing) -> [f64; 2] {
-    let shift = |n: usize| GUESS_SHIFT[n].min(0.9 * swing.room[n]);
+    let shift = |n: usize| GUESS_SHIFT[n].min(GUESS_FRACTION * swing.room[n]);
     [swing.start + shift(0), swing.end - shift(1)]
 }
 
-/// Rises from 0 at s ≤ 0 to 1 at s ≥ 1 with two continuous derivatives: its value and these.
+/// A function that rises from 0 at s ≤ 0 to 1 at s ≥ 1 with two continuous derivatives (smootherstep), and these derivatives.
 pub fn ramp(s: f64) -> [f64; 3] {
     let s = s.clamp(0.0, 1.0);
     [
@@ -118,33 +142,33 @@ pub fn ramp(s: f64) -> [f64; 3] {
     ]
 }
 
-/// σ of a force at sample k in a stance from `touch_down` to `lift_off`, both in samples; none at the ends of the motion.
+/// The activation σ of a force at sample k in a stance from `touch_down` to `lift_off`, in samples; none where the motion starts or ends.
 pub fn activation(k: usize, touch_down: Option<f64>, lift_off: Option<f64>) -> f64 {
     let k = k as f64;
     touch_down.map_or(1.0, |b| ramp(k - 1.0 - b)[0]) * lift_off.map_or(1.0, |a| ramp(a - k - 1.0)[0])
 }
 
-/// How a node depends on switches.
+/// The dependence of a node on switches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Timing {
     /// Not at all.
     Given,
-    /// A foot in or near a swing, at this time in samples.
+    /// A foot in a swing or close to one, at this time in samples.
     Moving(f64),
-    /// A force after touch-down: the ramp's argument is this minus the switch.
+    /// A force after touch-down: the argument of the ramp is this minus the switch.
     Rising(f64),
-    /// A force before lift-off: the ramp's argument is the switch minus this.
+    /// A force before lift-off: the argument of the ramp is the switch minus this.
     Falling(f64),
 }
 
-/// A node whose weights may depend on one or two switches, at the present x. Its terms and times stay the same variables.
+/// A node whose weights may depend on one or two switches, at the current x. The variables of its terms and times do not change.
 #[derive(Clone, Debug)]
 pub struct TimedNode {
-    /// Value and differential at the present x.
+    /// Value and differential at the current x.
     pub node: LinearNode,
     /// `mixed[term][time]`: the derivative of the term's weight with respect to the switch.
     pub mixed: Vec<[f64; 2]>,
-    /// Second derivatives of the value with respect to the switches: first twice, both, second twice.
+    /// Second derivatives of the value with respect to the switches a and b: aa, ab, bb.
     pub second: [[f64; 3]; 3],
     timing: Timing,
 }
@@ -155,9 +179,9 @@ impl TimedNode {
         Self { node, mixed: Vec::new(), second: [[0.0; 3]; 3], timing: Timing::Given }
     }
 
-    /// A foot at time k, in samples, of a swing from foothold to foothold by way of control points, with switches at `lift_off` and
-    /// the variable after it.
-    pub fn moving(k: f64, variables: [usize; 5], lift_off: usize) -> Self {
+    /// A foot at time k in samples. `variables` are those of a swing's foothold, control points and next foothold; `lift_off` is the
+    /// variable of the lift-off, followed by that of the touch-down.
+    pub fn moving(k: f64, variables: [usize; SWING_POINTS], lift_off: usize) -> Self {
         Self {
             node: LinearNode {
                 terms: variables.map(|v| (v, 0.0)).to_vec(),
@@ -169,12 +193,12 @@ impl TimedNode {
         }
     }
 
-    /// The force at sample k after the touch-down that is variable `touch_down`, full force in variable `full`.
+    /// The force at sample k after the touch-down in variable `touch_down`, with ḡ in variable `full`.
     pub fn rising(k: usize, full: usize, touch_down: usize) -> Self {
         Self::ramped(full, touch_down, Timing::Rising(k as f64 - 1.0))
     }
 
-    /// The force at sample k before the lift-off that is variable `lift_off`, full force in variable `full`.
+    /// The force at sample k before the lift-off in variable `lift_off`, with ḡ in variable `full`.
     pub fn falling(k: usize, full: usize, lift_off: usize) -> Self {
         Self::ramped(full, lift_off, Timing::Falling(k as f64 + 1.0))
     }
@@ -188,17 +212,17 @@ impl TimedNode {
         }
     }
 
-    /// Whether it depends on switches.
+    /// Whether the node depends on switches.
     pub fn is_timed(&self) -> bool {
         self.timing != Timing::Given
     }
 
-    /// σ of a force.
+    /// The activation σ of a force.
     pub fn activation(&self) -> f64 {
         if self.is_timed() { self.node.terms[0].1 } else { 1.0 }
     }
 
-    /// Brings the weights and their derivatives to x.
+    /// Updates the weights and their derivatives to x.
     pub fn update(&mut self, basis: &SwingBasis, x: &[f64]) {
         match self.timing {
             Timing::Given => {}
@@ -213,7 +237,7 @@ impl TimedNode {
         let duration = b - a;
         let u = (k - a) / duration;
         let weights = basis.at(u);
-        // ∂u/∂(a, b) and ∂²u/∂(aa, ab, bb); nothing where the foot stands.
+        // ∂u/∂(a, b) and ∂²u/∂(aa, ab, bb); zero where the foot stands.
         let moves = f64::from(u8::from(u > 0.0 && u < 1.0));
         let first = [(u - 1.0) / duration, -u / duration].map(|v| v * moves);
         let scale = moves / (duration * duration);
@@ -240,9 +264,9 @@ impl TimedNode {
     }
 
     fn update_ramped(&mut self, s: f64, sign: f64, x: &[f64]) {
-        let [share, slope, bend] = ramp(s);
+        let [activation, slope, bend] = ramp(s);
         let full = self.node.terms[0].0;
-        self.node.terms[0].1 = share;
+        self.node.terms[0].1 = activation;
         self.mixed[0] = [sign * slope, 0.0];
         for d in 0..3 {
             self.node.times[0].1[d] = sign * slope * x[full + d];
@@ -251,11 +275,11 @@ impl TimedNode {
     }
 }
 
-/// The samples of a stance between two swings at which the foot may bear something: a force acts from the sample before to the
-/// sample after, all of which must lie within the stance.
+/// The samples of a stance between two swings at which the foot may carry a load: a force acts from the sample before to the sample
+/// after, all of which must be within the stance.
 pub(super) fn force_samples(before: Option<&Swing>, after: Option<&Swing>, intervals: usize) -> Range<usize> {
     let first = before.map_or(0.0, |s| {
-        // At the very end of its room a switch leaves no force there.
+        // A switch at the very end of its room leaves no force at this sample.
         let earliest = s.end - s.room[1] + 1.0;
         if s.is_free() { earliest.floor() + 1.0 } else { earliest.ceil() }
     });
@@ -286,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_force_acts_within_its_stance_alone() {
+    fn a_force_acts_only_within_its_stance() {
         // It acts from k − 1 to k + 1.
         for (k, expected) in [(5, 0.0), (6, 0.0), (7, 1.0), (11, 1.0), (12, 0.0), (13, 0.0)] {
             assert_eq!(activation(k, Some(5.0), Some(13.0)), expected, "sample {k}");
@@ -300,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn switches_keep_out_of_each_others_way() {
+    fn switches_do_not_interfere() {
         let mut swings = walk();
         make_room(&mut swings, 80, 0.05, [0.1, 1.0]).expect("room");
         assert_eq!(swings[0].room, [2.0, 2.0]);
@@ -310,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_room_is_refused_in_words() {
+    fn gaits_without_room_are_rejected() {
         let refused = |swings: &[Swing], bounds| {
             make_room(&mut swings.to_vec(), 80, 0.05, bounds).expect_err("a refusal")
         };

@@ -1,37 +1,38 @@
-//! The energy of a map and its gradient: ∫ w ρ(J) dV by quadrature on a tensor grid.
+//! The energy of a map, the paper's E_map = ∫ w ρ(J) dV (the first term of Eq. 6), and its gradient, by quadrature on a tensor grid.
 //!
-//! J at all points is computed one axis at a time, and so is the way back (the adjoint). The x axis is swept with a window
-//! of the four slabs of coefficients that touch a plane of points; in a plane, rows of points along z are finished one by
-//! one, from coefficients to energy and back, so that the working set stays in the cache:
+//! J is computed one axis at a time (sum factorization), and the gradient likewise by the adjoint. The x axis is swept with a window
+//! of the four slabs of coefficients that a plane of points depends on. Within a plane, each row of points along z is processed from
+//! coefficients to energy and back before the next, so that the working set stays in the cache:
 //!
-//! slab (contracted along z) → plane (along x) → row (along y) → ρ, ∂ρ/∂J → back into row, plane, slab.
+//! slab (contracted along z) → plane (along x) → row (along y) → ρ, ∂ρ/∂J → back to row, plane, slab.
 
 use std::cmp::Ordering;
+use std::ops::Range;
 
-use super::axis::{Axis, Rule, Sample};
-use super::density::{Density, determinant};
+use super::axis::{MapAxis, Rule, Sample};
+use super::density::{Density, cofactors, determinant};
 use super::lanes::{LANES, Lanes};
 
 /// The tensor grid and its weights.
 pub(super) struct Assembly {
-    axes: [Axis; 3],
+    axes: [MapAxis; 3],
     x: Vec<Sample>,
     y: Vec<Sample>,
-    /// With the weight of the energy over z̄ in the quadrature weights; repeats the last point, unweighted, to fill the lanes.
+    /// Their weights include the weight of the energy over z̄. The last point is repeated with weight zero to fill the lanes.
     z: Vec<Sample>,
     weight_z: Vec<Lanes>,
 }
 
 /// Numbers at a row of points along z.
-type Row = [Lanes];
-/// A slab row holds φ₀, φ₁, φ₂ and then ∂φ₀/∂z̄, ∂φ₁/∂z̄, ∂φ₂/∂z̄.
+type PointRow = [Lanes];
+/// Point rows for each coefficient along y of a slab: φ₀, φ₁, φ₂ and then ∂φ₀/∂z̄, ∂φ₁/∂z̄, ∂φ₂/∂z̄.
 const SLAB_KINDS: usize = 6;
-/// A plane row holds, for each component, what becomes ∂/∂x̄, ∂/∂ȳ, ∂/∂z̄.
+/// Point rows for each coefficient along y of a plane: for each component, the parts of ∂/∂x̄, ∂/∂ȳ, ∂/∂z̄.
 const PLANE_KINDS: usize = 9;
 
 impl Assembly {
-    /// `weight(z̄)` weighs the volume, `face` (m) the bottom face.
-    pub fn new(axes: [Axis; 3], rule: Rule, weight: impl Fn(f64) -> f64, face: f64) -> Assembly {
+    /// `weight(z̄)` is the weight of the volume, `face` (m) that of the bottom face.
+    pub fn new(axes: [MapAxis; 3], rule: Rule, weight: impl Fn(f64) -> f64, face: f64) -> Assembly {
         let [x, y, mut z] = axes.map(|axis| axis.quadrature(rule));
         for s in &mut z {
             s.weight *= weight(s.at * axes[2].cell);
@@ -49,18 +50,18 @@ impl Assembly {
         Assembly { axes, x, y, z, weight_z }
     }
 
-    /// The points along an axis, with their weights.
+    /// The points along an axis with their weights.
     pub fn samples(&self, axis: usize) -> &[Sample] {
         [&self.x, &self.y, &self.z][axis]
     }
 
-    /// The energy and its gradient with respect to the coefficients (component, x, y, z in C order); infinite, with a
-    /// gradient of no meaning, where J is not allowed at some point.
+    /// The energy and its gradient with respect to the coefficients (component, x, y, z in C order). If J is not allowed at some
+    /// point, the energy is infinite and the gradient meaningless.
     pub fn energy(&self, density: impl Density, coefficients: &[f64], gradient: &mut [f64]) -> f64 {
         self.sweep(coefficients, gradient, |_, jacobian| density.at(jacobian))
     }
 
-    /// What a density says about its curvature at every point, in the order of [`Assembly::curved`].
+    /// The curvature of a density at all points, in the order of [`Assembly::curvature_product`].
     pub fn curvatures<C>(&self, coefficients: &[f64], at: impl Fn(&[Lanes; 9]) -> C) -> Vec<C> {
         let mut found = Vec::with_capacity(self.x.len() * self.y.len() * self.weight_z.len());
         let mut unused = vec![0.0; coefficients.len()];
@@ -71,8 +72,8 @@ impl Assembly {
         found
     }
 
-    /// A second derivative of the energy times a direction, from that of the density at every point.
-    pub fn curved<C>(
+    /// The second derivative of the energy times a direction, from that of the density at all points.
+    pub fn curvature_product<C>(
         &self,
         curvatures: &[C],
         times: impl Fn(&C, &[Lanes; 9]) -> [Lanes; 9],
@@ -82,22 +83,19 @@ impl Assembly {
         self.sweep(direction, out, |at, change| (Lanes::ZERO, times(&curvatures[at], change)));
     }
 
-    /// Visits all points, with their number and J; takes ρ and ∂ρ/∂J from the visit to the energy and its gradient.
+    /// Visits all points, with their number and J. Sums the ρ that a visit returns to the energy, its ∂ρ/∂J to the gradient.
     fn sweep(
         &self,
         coefficients: &[f64],
         gradient: &mut [f64],
         mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
     ) -> f64 {
-        let [_, ny, nz] = self.axes.map(|a| a.len());
         let blocks = self.weight_z.len();
-        let empty = |kinds: usize| vec![Lanes::ZERO; ny * kinds * blocks];
-        let mut slabs: [Vec<Lanes>; 4] = std::array::from_fn(|_| empty(SLAB_KINDS));
-        let mut slab_gradients = slabs.clone();
-        let mut plane = empty(PLANE_KINDS);
+        let mut window = SlabWindow::new(self, coefficients);
+        let mut slab_gradients = window.slabs.clone();
+        let mut plane = self.empty(PLANE_KINDS);
         let mut plane_gradient = plane.clone();
         let mut energy = 0.0;
-        let mut entered = 0;
         let mut finished = 0;
         let mut seen = 0;
         for sx in &self.x {
@@ -105,13 +103,10 @@ impl Assembly {
                 self.slab_adjoint(&slab_gradients[finished % 4], finished, gradient);
                 finished += 1;
             }
-            while entered < sx.first + 4 {
-                self.slab(coefficients, entered, &mut slabs[entered % 4]);
+            for entered in window.advance(sx) {
                 slab_gradients[entered % 4].fill(Lanes::ZERO);
-                entered += 1;
             }
-            let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
+            window.plane(sx, &mut plane);
             plane_gradient.fill(Lanes::ZERO);
             for sy in &self.y {
                 let weight = sx.weight * sy.weight;
@@ -126,36 +121,28 @@ impl Assembly {
                 plane_adjoint(sx, k, &plane_gradient, blocks, &mut slab_gradients[(sx.first + k) % 4]);
             }
         }
-        while finished < entered {
-            self.slab_adjoint(&slab_gradients[finished % 4], finished, gradient);
-            finished += 1;
+        for index in finished..window.entered {
+            self.slab_adjoint(&slab_gradients[index % 4], index, gradient);
         }
-        debug_assert_eq!(gradient.len(), 3 * entered * ny * nz);
         energy
     }
 
-    /// The least determinant of J over the points, how many are not positive, and where the least is, in cells.
+    /// The least determinant of J over all points, how many determinants are not positive, and the point of the least, in cells.
     pub fn determinants(&self, coefficients: &[f64]) -> (f64, usize, [f64; 3]) {
-        let ny = self.axes[1].len();
         let blocks = self.weight_z.len();
-        let mut slabs: [Vec<Lanes>; 4] = std::array::from_fn(|_| vec![Lanes::ZERO; ny * SLAB_KINDS * blocks]);
-        let mut plane = vec![Lanes::ZERO; ny * PLANE_KINDS * blocks];
-        let mut entered = 0;
+        let mut window = SlabWindow::new(self, coefficients);
+        let mut plane = self.empty(PLANE_KINDS);
         let (mut least, mut folded, mut at) = (f64::INFINITY, 0, [0.0; 3]);
         for sx in &self.x {
-            while entered < sx.first + 4 {
-                self.slab(coefficients, entered, &mut slabs[entered % 4]);
-                entered += 1;
-            }
-            let window = |k: usize| &slabs[(sx.first + k) % 4][..];
-            plane_of(sx, [window(0), window(1), window(2), window(3)], blocks, &mut plane);
+            window.advance(sx);
+            window.plane(sx, &mut plane);
             for sy in &self.y {
                 for b in 0..blocks {
                     let jacobian = jacobian_lanes(sy, &plane, blocks, b);
-                    let determinants = determinant(&jacobian).0;
+                    let determinants = determinant(&jacobian, &cofactors(&jacobian)).0;
                     for (det, sz) in determinants.into_iter().zip(&self.z[b * LANES..]) {
                         let folds = det.partial_cmp(&0.0) != Some(Ordering::Greater);
-                        // The points that only fill the lanes repeat the last one and do not count.
+                        // Points of weight zero only fill the lanes and do not count.
                         folded += usize::from(folds && sz.weight != 0.0);
                         if det < least || det.is_nan() {
                             (least, at) = (det, [sx.at, sy.at, sz.at]);
@@ -167,7 +154,12 @@ impl Assembly {
         (least, folded, at)
     }
 
-    /// Along z: φ and ∂φ/∂z̄ at the points, for the coefficients of one index along x.
+    /// Zeros for so many point rows for each coefficient along y.
+    fn empty(&self, kinds: usize) -> Vec<Lanes> {
+        vec![Lanes::ZERO; self.axes[1].len() * kinds * self.weight_z.len()]
+    }
+
+    /// Along z: the slab of the coefficients with one index along x.
     fn slab(&self, coefficients: &[f64], index: usize, slab: &mut [Lanes]) {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
         let blocks = self.weight_z.len();
@@ -189,6 +181,7 @@ impl Assembly {
         }
     }
 
+    /// The adjoint of [`Assembly::slab`].
     fn slab_adjoint(&self, slab: &[Lanes], index: usize, gradient: &mut [f64]) {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
         let blocks = self.weight_z.len();
@@ -209,6 +202,38 @@ impl Assembly {
     }
 }
 
+/// The slabs of the four coefficients along x that a plane of points depends on; slab i is in place i mod 4.
+struct SlabWindow<'a> {
+    assembly: &'a Assembly,
+    coefficients: &'a [f64],
+    slabs: [Vec<Lanes>; 4],
+    /// Slabs computed so far.
+    entered: usize,
+}
+
+impl<'a> SlabWindow<'a> {
+    fn new(assembly: &'a Assembly, coefficients: &'a [f64]) -> SlabWindow<'a> {
+        let slabs = std::array::from_fn(|_| assembly.empty(SLAB_KINDS));
+        SlabWindow { assembly, coefficients, slabs, entered: 0 }
+    }
+
+    /// Computes the slabs around a plane that are not yet in the window, and returns which.
+    fn advance(&mut self, plane: &Sample) -> Range<usize> {
+        let entering = self.entered..plane.first + 4;
+        for index in entering.clone() {
+            self.assembly.slab(self.coefficients, index, &mut self.slabs[index % 4]);
+        }
+        self.entered = entering.end;
+        entering
+    }
+
+    /// Along x: a plane of points from the slabs around it.
+    fn plane(&self, s: &Sample, plane: &mut [Lanes]) {
+        let slab = |k: usize| &self.slabs[(s.first + k) % 4][..];
+        plane_of(s, [slab(0), slab(1), slab(2), slab(3)], self.assembly.weight_z.len(), plane);
+    }
+}
+
 /// Along x: a plane of points from the four slabs around it.
 fn plane_of(s: &Sample, slabs: [&[Lanes]; 4], blocks: usize, plane: &mut [Lanes]) {
     let width = SLAB_KINDS * blocks;
@@ -225,6 +250,7 @@ fn plane_of(s: &Sample, slabs: [&[Lanes]; 4], blocks: usize, plane: &mut [Lanes]
     }
 }
 
+/// The adjoint of [`plane_of`] with respect to the k-th slab; adds to it.
 fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mut [Lanes]) {
     if s.value[k] == 0.0 && s.slope[k] == 0.0 {
         return;
@@ -241,7 +267,7 @@ fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mu
     }
 }
 
-/// Along y, and back: the energy of one row of points; its gradient is added to the plane's.
+/// Along y and back: returns the energy of one row of points and adds its gradient to the plane's.
 #[inline]
 fn row(
     mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
@@ -271,11 +297,11 @@ fn row(
     sum.sum()
 }
 
-/// Along y: J at the points of one block of a row.
+/// Along y: J at one block of points of a row.
 #[inline(always)]
 fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [Lanes; 9] {
     let width = PLANE_KINDS * blocks;
-    let sources: [&Row; 4] = std::array::from_fn(|k| &plane[(s.first + k) * width..][..width]);
+    let sources: [&PointRow; 4] = std::array::from_fn(|k| &plane[(s.first + k) * width..][..width]);
     let mut jacobian = [Lanes::ZERO; 9];
     for (kind, out) in jacobian.iter_mut().enumerate() {
         let w = if kind % 3 == 1 { &s.slope } else { &s.value };
@@ -286,7 +312,7 @@ fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [
 }
 
 /// out = Σ wₖ sourceₖ.
-fn combine(w: &[f64; 4], sources: [&Row; 4], out: &mut Row) {
+fn combine(w: &[f64; 4], sources: [&PointRow; 4], out: &mut PointRow) {
     let [a, b, c, d] = sources;
     for ((((o, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
         *o = w[0] * *a + w[1] * *b + w[2] * *c + w[3] * *d;
@@ -294,7 +320,7 @@ fn combine(w: &[f64; 4], sources: [&Row; 4], out: &mut Row) {
 }
 
 /// out += w source.
-fn accumulate(w: f64, source: &Row, out: &mut Row) {
+fn accumulate(w: f64, source: &PointRow, out: &mut PointRow) {
     for (o, a) in out.iter_mut().zip(source) {
         *o += w * *a;
     }
@@ -307,9 +333,13 @@ mod tests {
 
     #[test]
     fn energy_gradient_matches_central_differences_for_both_rules() {
-        let axes = [Axis { cells: 5, cell: 0.4 }, Axis { cells: 4, cell: 0.5 }, Axis { cells: 4, cell: 0.6 }];
+        let axes = [
+            MapAxis { cells: 5, cell: 0.4 },
+            MapAxis { cells: 4, cell: 0.5 },
+            MapAxis { cells: 4, cell: 0.6 },
+        ];
         let [nx, ny, nz] = axes.map(|a| a.len());
-        // Face coefficients of the identity, disturbed.
+        // The face coefficients of the identity, perturbed.
         let mut u = vec![0.0; 3 * nx * ny * nz];
         for c in 0..3 {
             for i in 0..nx {

@@ -1,30 +1,31 @@
-//! The paper's energy with its barrier, and the Gauss–Newton part of its second derivative.
+//! The paper's energy density with its barrier (the ρ of Eq. 6), and the Gauss–Newton part of its second derivative.
 
-use super::density::{Density, cofactors};
+use super::density::{Density, MIN_DET, cofactors, determinant};
 use super::distance;
 use super::lanes::Lanes;
 use super::singular::Singular;
 use crate::scenario::MapScale;
 
-/// Weight μ of the barrier: over flat ground, where nothing holds the top, it stretches space by ¾ μ.
+/// Weight μ of the barrier. Over flat ground, where nothing holds the top face, it stretches space by ¾ μ.
 const BARRIER_WEIGHT: f64 = 1e-3;
 
-/// ρ = ½‖J − s U Vᵀ‖² − μ log det J, infinite where space would fold (Section IV-B, halved).
+/// ρ = ½‖J − s U Vᵀ‖² − μ log det J, infinite where space folds: half the paper's ρ of Eq. 6 (so μ is half
+/// the paper's), with s in place of |Σ|^⅓.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Barrier {
     pub scale: MapScale,
 }
 
 impl Density for Barrier {
-    /// With s free of U and V, ∂ρ/∂J = J − s U Vᵀ − (tr Σ − 3s) ∂s/∂J − μ J⁻ᵀ; the third term is zero for s = tr Σ/3, and
-    /// ∂s/∂J = s J⁻ᵀ/3 for s = |Σ|^⅓.
+    /// s does not depend on U and V, so ∂ρ/∂J = J − s U Vᵀ − (tr Σ − 3s) ∂s/∂J − μ J⁻ᵀ. The third term is zero for s = tr Σ/3;
+    /// for s = |Σ|^⅓, ∂s/∂J = s J⁻ᵀ/3.
     #[inline]
     fn at(&self, j: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
         let singular = Singular::of(j);
         let [a, b, c] = singular.sigma;
         let scale = distance::scale(self.scale, &singular.sigma);
         let cofactor = cofactors(j);
-        let det = j[0] * cofactor[0] + j[1] * cofactor[1] + j[2] * cofactor[2];
+        let det = determinant(j, &cofactor);
         let inverse = det.map(|d| if d > MIN_DET { 1.0 / d } else { 0.0 });
         let excess = match self.scale {
             MapScale::Trace => Lanes::ZERO,
@@ -43,33 +44,31 @@ impl Density for Barrier {
     }
 }
 
-/// Determinants up to here count as folded.
-const MIN_DET: f64 = 1e-12;
-
-/// ∂²ρ/∂J² as far as Gauss and Newton take it: positive semidefinite, in the axes of U and V.
+/// The Gauss–Newton approximation of ∂²ρ/∂J², positive semidefinite, in the bases U and V.
 ///
-/// With M̂ = UᵀMV for a change M of J, the residual Σ − s changes by D diag(M̂), D_ij = δ_ij − ∂s/∂σ_j; off the diagonal its
-/// symmetric part changes by that of M̂, its skew part by (1 − 2s/(σ_i + σ_j)) times that of M̂, since U Vᵀ turns along. Of the
-/// barrier's curvature μ J⁻ᵀMᵀJ⁻ᵀ the parts that are not negative are kept: μ/σ_i² and, for the symmetric part, μ/(σ_i σ_j).
+/// With M̂ = UᵀMV for a change M of J, the residual Σ − s changes by D diag(M̂), D_ij = δ_ij − ∂s/∂σ_j. Off the diagonal, its
+/// symmetric part changes by that of M̂, and its skew part by (1 − 2s/(σ_i + σ_j)) times that of M̂, since U Vᵀ rotates with J. Of
+/// the barrier's curvature μ J⁻ᵀMᵀJ⁻ᵀ, the nonnegative parts are kept: μ/σ_i² and, for the symmetric part, μ/(σ_i σ_j).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Curvature {
+pub(super) struct BarrierCurvature {
     u: [Lanes; 9],
     v: [Lanes; 9],
     /// DᵀD + μ Σ⁻², flat.
     diagonal: [Lanes; 9],
-    /// For (0, 1), (0, 2), (1, 2): half the factors of the symmetric and of the skew part.
+    /// Half the factors of the symmetric part, in the order of [`PAIRS`].
     symmetric: [Lanes; 3],
+    /// Half the factors of the skew part.
     skew: [Lanes; 3],
 }
 
-/// Places off the diagonal.
+/// Entries above the diagonal.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 impl Barrier {
-    /// At J, which must not be folded, with `damping` times a measure of how much M changes J in proportion, M̂_ij²/(σ_i σ_j):
-    /// that holds back the points that are about to fold and leaves the others free.
+    /// The curvature at J, which must not be folded, plus `damping` times that of the relative change M̂_ij²/(σ_i σ_j), which
+    /// restrains the points that are about to fold and leaves the others free.
     #[inline]
-    pub fn curvature(&self, j: &[Lanes; 9], damping: f64) -> Curvature {
+    pub fn curvature(&self, j: &[Lanes; 9], damping: f64) -> BarrierCurvature {
         let Singular { u, sigma, v } = Singular::of(j);
         let scale = distance::scale(self.scale, &sigma);
         let inverse = sigma.map(|s| s.map(|s| 1.0 / s.max(MIN_DET)));
@@ -88,18 +87,18 @@ impl Barrier {
         }
         let symmetric = PAIRS.map(|(i, k)| 0.5 * (Lanes::splat(1.0) + hold * inverse[i] * inverse[k]));
         let skew = PAIRS.map(|(i, k)| {
-            let share = Lanes::splat(1.0) - 2.0 * scale / (sigma[i] + sigma[k]).map(|s| s.max(MIN_DET));
-            0.5 * (share * share + damping * inverse[i] * inverse[k])
+            let factor = Lanes::splat(1.0) - 2.0 * scale / (sigma[i] + sigma[k]).map(|s| s.max(MIN_DET));
+            0.5 * (factor * factor + damping * inverse[i] * inverse[k])
         });
-        Curvature { u, v, diagonal, symmetric, skew }
+        BarrierCurvature { u, v, diagonal, symmetric, skew }
     }
 }
 
-impl Curvature {
-    /// Times a change of J.
+impl BarrierCurvature {
+    /// The curvature times a change of J.
     #[inline]
     pub fn times(&self, change: &[Lanes; 9]) -> [Lanes; 9] {
-        let m = product(&turned(&self.u), &product(change, &self.v));
+        let m = product(&transposed(&self.u), &product(change, &self.v));
         let mut out = [Lanes::ZERO; 9];
         for i in 0..3 {
             for k in 0..3 {
@@ -112,12 +111,12 @@ impl Curvature {
             out[3 * i + k] = symmetric + skew;
             out[3 * k + i] = symmetric - skew;
         }
-        product(&self.u, &product(&out, &turned(&self.v)))
+        product(&self.u, &product(&out, &transposed(&self.v)))
     }
 }
 
 #[inline]
-fn turned(a: &[Lanes; 9]) -> [Lanes; 9] {
+fn transposed(a: &[Lanes; 9]) -> [Lanes; 9] {
     [a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]]
 }
 
@@ -143,12 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn folds_are_infinitely_dear() {
+    fn folds_cost_infinitely_much() {
         let folded = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0];
         assert_eq!(value(Barrier { scale: MapScale::Trace }, folded), f64::INFINITY);
     }
 
-    /// Gauss–Newton is exact where the residual is small: at a nearly conformal J, but for the barrier's skew part.
+    /// Gauss–Newton is exact where the residual is small, that is, at a nearly conformal J, except for the barrier's skew part.
     #[test]
     fn curvature_matches_differences_of_the_gradient_near_conformal_maps() {
         let (s, c) = 0.7_f64.sin_cos();
@@ -188,9 +187,9 @@ mod tests {
         })
     }
 
-    /// In J's own axes the measure is Σ M_ij²/(σ_i σ_j).
+    /// For a diagonal J, the relative change is Σ M_ij²/(σ_i σ_j).
     #[test]
-    fn damping_weighs_changes_in_proportion() {
+    fn damping_penalizes_relative_changes() {
         let sigma = [1.5, 1.0, 0.1];
         let j = [sigma[0], 0.0, 0.0, 0.0, sigma[1], 0.0, 0.0, 0.0, sigma[2]];
         let density = Barrier { scale: MapScale::Trace };
@@ -204,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn curvature_is_symmetric_and_nowhere_negative() {
+    fn curvature_is_symmetric_and_positive_semidefinite() {
         for scale in [MapScale::Trace, MapScale::Determinant] {
             let matrix = matrix(Barrier { scale }, BENT, 0.0);
             assert!((&matrix - matrix.transpose()).norm() < 1e-12);

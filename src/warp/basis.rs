@@ -1,47 +1,31 @@
-//! Uniform cubic B-splines on one axis: N cells of unit size, N + 3 coefficients, parameter s in cells.
+//! Weights of a uniform cubic B-spline along one axis (N cells of unit size, N + 3 coefficients, parameter s in cells), and their
+//! extension beyond the ends.
 
-/// The highest derivative that is of use: the third, constant in a cell.
-pub(super) const MAX_ORDER: usize = 3;
+use crate::bspline::uniform_cubic;
 
-/// The four basis functions that live in a cell and their derivatives up to the third, at t in [0, 1]; `[order][function]`.
-fn in_cell(t: f64) -> [[f64; 4]; MAX_ORDER + 1] {
-    let r = 1.0 - t;
-    [
-        [
-            r * r * r / 6.0,
-            ((3.0 * t - 6.0) * t * t + 4.0) / 6.0,
-            (((3.0 - 3.0 * t) * t + 3.0) * t + 1.0) / 6.0,
-            t * t * t / 6.0,
-        ],
-        [-r * r / 2.0, (3.0 * t - 4.0) * t / 2.0, ((2.0 - 3.0 * t) * t + 1.0) / 2.0, t * t / 2.0],
-        [r, 3.0 * t - 2.0, 1.0 - 3.0 * t, t],
-        [-1.0, 3.0, -3.0, 1.0],
-    ]
-}
-
-/// What one axis contributes to φ at a point.
+/// The weights along one axis at a point.
 pub(super) struct AxisWeights<const M: usize> {
-    /// The first of the four coefficients touched.
+    /// The first of the four coefficients with a weight.
     pub first: usize,
-    /// Their weights, `[order][coefficient]`, derivatives per cell.
+    /// Their weights, `[derivative][coefficient]`, derivatives with respect to s.
     pub weight: [[f64; 4]; M],
-    /// A translation along this axis to be added to φ, in cells, and its derivatives; zero inside the box.
+    /// A translation along this axis to be added to φ, in cells, and its derivatives. Zero inside the box.
     pub shift: [f64; M],
 }
 
-/// Weights for derivatives below the M-th at parameter `s`, which may lie outside [0, cells].
+/// Weights for derivatives below the M-th at parameter `s`, which may be outside [0, cells].
 ///
-/// Outside, the spline continues as C² "extrusion": over one cell beyond the face the Taylor terms of the spline fade out
-/// and a unit translation along the axis fades in, so that further out φ is the face, moved. (Continuing the polynomial
-/// instead folds space within a metre.) With u the distance from the face in cells, σ its sign, and b, b', b'' at the face:
+/// Outside, the spline is extruded with C² continuity: within one cell of the face, the Taylor terms of the spline fade out and a unit
+/// translation along the axis fades in; beyond, φ is the face, translated. (Continuing the polynomial instead folds space within a
+/// meter.) With u the distance from the face in cells, σ its sign, and b, b', b'' the weights at the face:
 ///
 ///   b(u) = b + σ a(u) b' + c(u) b'',   a' = 1 − u²(3 − 2u),   c'' = (1 − u)(1 − 3u),   shift' = 1 − a',
 ///
-/// for u ≤ 1 and constant beyond, except for the shift, which goes on with slope one.
+/// for u ≤ 1. Beyond, all are constant except the shift, whose slope is one.
 pub(super) fn axis_weights<const M: usize>(s: f64, cells: usize) -> AxisWeights<M> {
     let inside = s.clamp(0.0, cells as f64);
     let first = (inside as usize).min(cells - 1);
-    let b = in_cell(inside - first as f64);
+    let b = uniform_cubic(inside - first as f64);
     let over = s - inside;
     if over == 0.0 {
         return AxisWeights { first, weight: std::array::from_fn(|m| b[m]), shift: [0.0; M] };
@@ -105,7 +89,7 @@ mod tests {
     #[test]
     fn weights_are_continuous_up_to_the_second_derivative_at_the_face_and_one_cell_beyond() {
         for s in [-1.0, 0.0, 2.0, 5.0, 6.0] {
-            // In terms of coefficients, since the first index may change at a knot.
+            // By coefficient, since `first` may change at a knot.
             let dense = |s: f64| {
                 let w = axis_weights::<3>(s, 5);
                 let mut out = [[0.0; 9]; 3];

@@ -1,16 +1,17 @@
-//! The bottom face of the box and the ground: the coefficients of φ₂ there are the L² projection of h(φ₀, φ₁).
+//! The L² projection of functions onto the splines of the box's bottom face, and its adjoint.
 
-use super::axis::{Axis, Projection, Sample};
+use super::axis::{MapAxis, Projection, Sample};
 
-/// A tensor grid of Gauss points on the bottom face.
+/// The splines of the bottom face, and a tensor grid of Gauss points.
 pub(super) struct Bottom {
-    axes: [Axis; 2],
+    axes: [MapAxis; 2],
     x: Projection,
     y: Projection,
 }
 
 impl Bottom {
-    pub fn new(x: &Axis, y: &Axis) -> Bottom {
+    /// The face spanned by two axes.
+    pub fn new(x: &MapAxis, y: &MapAxis) -> Bottom {
         Bottom { axes: [*x, *y], x: Projection::new(x), y: Projection::new(y) }
     }
 
@@ -19,7 +20,7 @@ impl Bottom {
         self.x.samples.iter().flat_map(|sx| self.y.samples.iter().map(|sy| [sx.at, sy.at]))
     }
 
-    /// From face coefficients to control points of a two-dimensional spline, in place.
+    /// Turns face coefficients into the control points of a two-dimensional spline, in place.
     pub fn to_control_points(&self, coefficients: &mut Vec<f64>) {
         let [nx, ny] = self.axes.map(|a| a.len());
         for line in coefficients.chunks_exact_mut(ny) {
@@ -32,34 +33,34 @@ impl Bottom {
         *coefficients = transposed(&turned, ny, nx);
     }
 
-    /// The spline with these face coefficients (nx · ny) at the Gauss points.
+    /// B u: the spline with these face coefficients (nx · ny) at the Gauss points.
     pub fn values(&self, coefficients: &[f64]) -> Vec<f64> {
         let ny = self.axes[1].len();
         let along_x = expand(&self.x.samples, coefficients, ny);
-        // y is the fast axis: each row is expanded by itself.
+        // y is the fast axis.
         along_x.chunks_exact(ny).flat_map(|row| self.y.samples.iter().map(|s| dot(s, row))).collect()
     }
 
-    /// Bᵀ applied to values at the Gauss points: the adjoint of [`Bottom::values`].
+    /// Bᵀ f: the adjoint of [`Bottom::values`].
     pub fn values_adjoint(&self, values: &[f64]) -> Vec<f64> {
-        self.collect(values, |_| 1.0)
+        self.gather(values, |_| 1.0)
     }
 
-    /// The coefficients of the L² projection of values at the Gauss points: M⁻¹ Bᵀ W f.
+    /// M⁻¹ Bᵀ W f: the coefficients of the L² projection of a function given at the Gauss points.
     pub fn project(&self, values: &[f64]) -> Vec<f64> {
-        let mut out = self.collect(values, |s| s.weight);
+        let mut out = self.gather(values, |s| s.weight);
         self.solve(&mut out);
         out
     }
 
-    /// The adjoint of [`Bottom::project`]: W B M⁻¹ g.
+    /// W B M⁻¹ g: the adjoint of [`Bottom::project`].
     pub fn project_adjoint(&self, gradient: &[f64]) -> Vec<f64> {
         let mut inverse = gradient.to_vec();
         self.solve(&mut inverse);
         self.weighted(&self.values(&inverse))
     }
 
-    /// Values at the Gauss points times their quadrature weights.
+    /// W f: values at the Gauss points times the quadrature weights.
     pub fn weighted(&self, values: &[f64]) -> Vec<f64> {
         let mut out = values.to_vec();
         for (row, sx) in out.chunks_exact_mut(self.y.samples.len()).zip(&self.x.samples) {
@@ -70,8 +71,8 @@ impl Bottom {
         out
     }
 
-    /// Bᵀ f, each point multiplied by a factor for each axis.
-    fn collect(&self, values: &[f64], factor: impl Fn(&Sample) -> f64) -> Vec<f64> {
+    /// Bᵀ f, with each point multiplied by a factor for each axis.
+    fn gather(&self, values: &[f64], factor: impl Fn(&Sample) -> f64) -> Vec<f64> {
         let [nx, ny] = self.axes.map(|a| a.len());
         let mut out = vec![0.0; nx * ny];
         let mut row = vec![0.0; ny];
@@ -92,7 +93,7 @@ impl Bottom {
         out
     }
 
-    /// M⁻¹ along both axes.
+    /// Applies M⁻¹ along both axes, in place.
     fn solve(&self, coefficients: &mut Vec<f64>) {
         let [nx, ny] = self.axes.map(|a| a.len());
         self.x.solve(coefficients, ny);
@@ -102,11 +103,12 @@ impl Bottom {
     }
 }
 
+/// The spline with these coefficients at a point.
 fn dot(sample: &Sample, line: &[f64]) -> f64 {
     (0..4).map(|k| sample.value[k] * line[sample.first + k]).sum()
 }
 
-/// Rows of `width` at the samples from rows of `width` at the coefficients.
+/// Rows of length `width` at the samples, from such rows at the coefficients.
 fn expand(samples: &[Sample], coefficients: &[f64], width: usize) -> Vec<f64> {
     let mut out = vec![0.0; samples.len() * width];
     for (row, s) in out.chunks_exact_mut(width).zip(samples) {
@@ -136,7 +138,7 @@ mod tests {
     use super::*;
 
     fn bottom() -> (Bottom, usize, usize) {
-        let (x, y) = (Axis { cells: 9, cell: 0.3 }, Axis { cells: 6, cell: 0.5 });
+        let (x, y) = (MapAxis { cells: 9, cell: 0.3 }, MapAxis { cells: 6, cell: 0.5 });
         (Bottom::new(&x, &y), x.len(), y.len())
     }
 
@@ -165,7 +167,7 @@ mod tests {
 
     #[test]
     fn end_coefficients_are_face_values() {
-        let axis = Axis { cells: 5, cell: 0.2 };
+        let axis = MapAxis { cells: 5, cell: 0.2 };
         let mut line = wave(8, 0.0);
         axis.control_to_face(&mut line);
         for (at, index) in [(0.0, 0), (5.0, 7)] {

@@ -1,103 +1,79 @@
-//! From a terrain to its map: coarse grids first, each the start of the next finer one.
+//! Builds the map over a terrain: coarse grids first, each the start of the next finer one.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::time::Instant;
 
-use super::WarpMap;
 use super::axis::Rule;
 use super::barrier::Barrier;
 use super::density::{Density, Mips};
 use super::distance::Distance;
 use super::gauss_newton::gauss_newton;
-use super::lbfgs::{Limits, Outcome, minimize};
+use super::lbfgs::minimize;
 use super::local_global::alternate;
-use super::problem::{Problem, Quadrature};
+use super::objective::{Minimized, Observer, StoppingLimits};
+use super::problem::{Quadrature, WarpProblem};
 use super::report::{EnergyHistory, MapReport, RejectedMap};
+use super::spline::WarpMap;
 use crate::heightfield::Heightfield;
 use crate::scenario::{MapMethod, MapSpec};
 use crate::{Error, Result};
 
-/// Where the optimizer stands.
+/// The state of the optimizer before an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapProgress {
-    /// Cells of the grid at work.
+    /// Cells of the current grid.
     pub cells: [usize; 3],
     /// Iteration on this grid.
     pub iteration: usize,
     /// The energy, m³.
     pub energy: f64,
-    /// gᵀHg over the energy, which falls to `tolerance`.
+    /// gᵀd relative to the energy, g the gradient and d the step: the optimizer converges when it falls to `tolerance`.
     pub decrement: f64,
-    /// Where this grid is done.
+    /// Where the optimizer converges on this grid.
     pub tolerance: f64,
 }
 
-/// On all grids: gᵀHg relative to the energy.
+/// The relative decrement at which the optimizer converges, on all grids.
 const TOLERANCE: f64 = 1e-4;
-/// Energies much below this are rounding, m³: over flat ground there is nothing to do.
+/// Energies much below this are rounding errors, m³, as over flat ground.
 const ENERGY_FLOOR: f64 = 1e-9;
 /// On the finest grid. The benchmark's hardest terrain takes 300.
 const MAX_ITERATIONS: usize = 600;
-/// On the grids before it, which need not be done with: what they cannot resolve only keeps them busy.
+/// On each coarser grid. These need not converge: they would spend iterations on ground that is too fine for them.
 const MAX_COARSE_ITERATIONS: usize = 150;
-/// In how many steps ground is grown, and the iterations on each but the last.
+/// Number of steps in which new ground grows.
 const GROWTH_STEPS: usize = 8;
+/// Iterations for each of these steps but the last.
 const GROWTH_ITERATIONS: usize = 30;
-/// What is tried in turn while the map is folded between its points, as happens at the top of the box over ground of slope 3: a
-/// greater weight of what is above the ground, by these factors, and at last more points a cell.
+/// Tried in order while the map is folded between its quadrature points, as happens at the top of the box over slopes of 3: more
+/// weight above the ground, by these factors, and in the end more points per cell.
 const RETRIES: [(Rule, f64); 3] = [(Rule::Lobatto, 3.0), (Rule::Lobatto, 10.0), (Rule::Gauss, 10.0)];
-/// The coarsest grid has at least this many cells along each axis, where the numbers can be halved at all.
+/// The coarsest grid has at least this many cells along each axis that can be halved.
 const COARSEST: usize = 8;
+/// If the scenario does not give the cells, and the bottom misses the terrain by this much, m, the cells are halved along x and y.
+/// Below, there is no need; above, the terrain has edges that cells of half the size do not follow either.
+const WORTH_REFINING: Range<f64> = 1e-3..1e-2;
+/// What `map.method = "auto"` tries before [`FALLBACK`], in order of cost. (Wherever `dirichlet` is good enough, the shear is better
+/// at the ground; the other methods are more expensive than `mips`.)
+const CHEAPER: [MapMethod; 1] = [MapMethod::Shear];
+/// What `map.method = "auto"` uses where nothing cheaper is good enough.
+const FALLBACK: MapMethod = MapMethod::Mips;
 
-/// By how much cells are to be halved along x and y where the scenario does not give them: when the bottom misses the terrain by
-/// more than the first. Beyond the second the terrain has edges that cells half as large do not follow either, m.
-const WORTH_REFINING: std::ops::Range<f64> = 1e-3..1e-2;
-
-/// Finds the map over a terrain by the method of `spec`. F's box stands over the terrain's rectangle.
+/// Builds the map over a terrain by the method of `spec`. The box of F stands on the terrain's rectangle.
 ///
-/// `progress` is called once an iteration and may stop the work.
+/// `progress` is called before each iteration and may stop the optimizer.
 ///
 /// # Errors
-/// For a grid that makes no sense, and when `progress` says to stop. A map that is folded or did not converge is not an
-/// error: its report says so.
+/// If `spec` is not valid, or if `progress` stops the optimizer. A map that is folded or has not converged is not an error; its
+/// report says so.
 pub fn build(
     field: &Heightfield,
     spec: &MapSpec,
     progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
 ) -> Result<(WarpMap, MapReport)> {
     let start = Instant::now();
-    let (map, mut report) = match spec.method {
-        MapMethod::Auto => auto(field, spec, progress)?,
-        method => by_method(field, spec, method, progress)?,
-    };
+    let (map, mut report) = by_method(field, spec, spec.method, progress)?;
     report.seconds = start.elapsed().as_secs_f64();
-    Ok((map, report))
-}
-
-/// In the order of their cost. (`dirichlet` is left out: wherever it serves, the shear was better at the ground; the others cost
-/// more than `mips`.)
-const CANDIDATES: [MapMethod; 2] = [MapMethod::Shear, MapMethod::Mips];
-
-/// The first of the candidates that is good enough; the last, where none is.
-fn auto(
-    field: &Heightfield,
-    spec: &MapSpec,
-    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
-) -> Result<(WarpMap, MapReport)> {
-    let mut trials = Vec::new();
-    let (last, first) = CANDIDATES.split_last().unwrap_or((&MapMethod::Mips, &[]));
-    for method in first {
-        let (map, mut report) = by_method(field, spec, *method, progress)?;
-        match report.shortfall() {
-            None => {
-                report.rejected = trials;
-                return Ok((map, report));
-            }
-            Some(why) => trials.push(RejectedMap { method: *method, why }),
-        }
-    }
-    let (map, mut report) = by_method(field, spec, *last, progress)?;
-    report.rejected = trials;
     Ok((map, report))
 }
 
@@ -109,23 +85,41 @@ fn by_method(
 ) -> Result<(WarpMap, MapReport)> {
     let spec = &MapSpec { method, ..spec.clone() };
     match method {
+        MapMethod::Auto => auto(field, spec, progress),
         MapMethod::Shear => shear(field, spec),
-        MapMethod::Mips | MapMethod::Auto => optimized(field, spec, Mips, quasi_newton, progress),
+        MapMethod::Mips => optimized(field, spec, Mips, quasi_newton, progress),
         MapMethod::Dirichlet => optimized(field, spec, Distance::Identity, quasi_newton, progress),
         MapMethod::Arap => optimized(field, spec, Distance::Rotation, quasi_newton, progress),
-        MapMethod::AcapLocalGlobal => optimized(
-            field,
-            spec,
-            Distance::Similarity(spec.scale),
-            |p, u, l, report| alternate(p, u, l, report),
-            progress,
-        ),
+        MapMethod::AcapLocalGlobal => {
+            optimized(field, spec, Distance::Similarity(spec.scale), alternate, progress)
+        }
         MapMethod::AcapNewton => {
             optimized(field, spec, Barrier { scale: spec.scale }, gauss_newton, progress)
         }
     }
 }
 
+/// The first map that is good enough, cheapest method first.
+fn auto(
+    field: &Heightfield,
+    spec: &MapSpec,
+    progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<(WarpMap, MapReport)> {
+    let mut rejected = Vec::new();
+    for method in CHEAPER {
+        let (map, mut report) = by_method(field, spec, method, progress)?;
+        let Some(why) = report.shortfall() else {
+            report.rejected = rejected;
+            return Ok((map, report));
+        };
+        rejected.push(RejectedMap { method, why });
+    }
+    let (map, mut report) = by_method(field, spec, FALLBACK, progress)?;
+    report.rejected = rejected;
+    Ok((map, report))
+}
+
+/// The shear, on a finer grid where that is worthwhile.
 fn shear(field: &Heightfield, spec: &MapSpec) -> Result<(WarpMap, MapReport)> {
     let map = WarpMap::shear(field, spec)?;
     let report = MapReport::measure(&map, field, spec.method);
@@ -142,21 +136,17 @@ fn worth_refining(spec: &MapSpec, report: &MapReport) -> bool {
     spec.cells.is_none() && report.inverted_points == 0 && WORTH_REFINING.contains(&report.misfit_max)
 }
 
-/// How an energy is minimized on one grid.
-type Minimizer<D> = fn(
-    &mut Problem<'_, D>,
-    &mut Vec<f64>,
-    Limits,
-    &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
-) -> Outcome;
+/// Minimizes an energy on one grid, from the coefficients given, and returns those where it ends.
+type Minimizer<D> =
+    fn(&mut WarpProblem<'_, D>, Vec<f64>, StoppingLimits, &mut Observer) -> (Vec<f64>, Minimized);
 
 fn quasi_newton<D: Density>(
-    problem: &mut Problem<'_, D>,
-    u: &mut Vec<f64>,
-    limits: Limits,
-    progress: &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
-) -> Outcome {
-    minimize(problem, u, limits, progress)
+    problem: &mut WarpProblem<'_, D>,
+    u: Vec<f64>,
+    limits: StoppingLimits,
+    observer: &mut Observer,
+) -> (Vec<f64>, Minimized) {
+    minimize(problem, u, limits, observer)
 }
 
 /// The map that minimizes an energy.
@@ -167,160 +157,222 @@ fn optimized<D: Density>(
     minimizer: Minimizer<D>,
     progress: &mut dyn FnMut(MapProgress) -> ControlFlow<()>,
 ) -> Result<(WarpMap, MapReport)> {
-    let (outcome, notes, history) = (Outcome::default(), Vec::new(), Vec::new());
-    let mut run = Run { field, density, minimizer, progress, outcome, notes, history };
-    let mut best = run.attempt(spec, Quadrature { rule: Rule::Lobatto, torso_weight: spec.torso_weight })?;
-    for (rule, factor) in RETRIES {
-        if best.report.inverted_points == 0 || density.may_fold() {
-            break;
-        }
-        let points = Quadrature { rule, torso_weight: factor * spec.torso_weight };
-        run.notes.push(format!(
-            "the map was folded between its quadrature points; it was built again with torso_weight {:.2}{}",
-            points.torso_weight,
-            if rule == Rule::Gauss { " and four Gauss points a cell and axis" } else { "" }
-        ));
-        best = best.or_better(run.attempt(spec, points)?);
-    }
-    if worth_refining(spec, &best.report) {
-        let points = best.points;
-        let map = run.minimized(&best.map.refined([true, true, false]), points, MAX_ITERATIONS)?;
-        best = best.or_better(run.measured(map, spec, points));
-    }
-    let Attempt { map, mut report, outcome, .. } = best;
-    report.converged = outcome.converged;
-    report.energy = outcome.value;
-    report.iterations = run.outcome.iterations;
-    report.evaluations = run.outcome.evaluations;
-    report.history = run.history;
-    if !report.converged {
-        report.warnings.push(format!(
-            "the optimizer stopped before its rule was met (gᵀHg is {:.1e} of the energy, wanted {TOLERANCE:.0e}), as happens where the terrain is steeper than its cells can follow; the map could be better",
-            outcome.decrement / (outcome.value.abs() + ENERGY_FLOOR)
-        ));
-    }
-    report.warnings.append(&mut run.notes);
-    Ok((map, report))
+    let mut builder = MapBuilder {
+        field,
+        spec,
+        density,
+        minimizer,
+        progress,
+        iterations: 0,
+        evaluations: 0,
+        notes: Vec::new(),
+        history: Vec::new(),
+    };
+    let attempt = builder.attempt(Quadrature { rule: Rule::Lobatto, torso_weight: spec.torso_weight })?;
+    let attempt = builder.retried_while_folded(attempt)?;
+    let attempt = builder.refined_if_worthwhile(attempt)?;
+    Ok(builder.finished(attempt))
 }
 
-/// A map, what it is like, and how it was found.
+/// A map, its quality, and how it was found.
 struct Attempt {
     map: WarpMap,
     report: MapReport,
-    outcome: Outcome,
+    minimized: Minimized,
     points: Quadrature,
 }
 
 impl Attempt {
-    /// The one that is folded at fewer points; where both are at as many, the one closer to the terrain.
+    /// The attempt with fewer folded points or, if they have equally many, the one that is closer to the terrain.
     fn or_better(self, other: Attempt) -> Attempt {
         let badness = |a: &Attempt| (a.report.inverted_points, a.report.misfit_max);
         if badness(&other) < badness(&self) { other } else { self }
     }
 }
 
-/// One building of a map, with what has been spent on it.
-struct Run<'a, D> {
+/// A grid's place in the sequence from coarse to fine.
+#[derive(Clone, Copy, PartialEq)]
+enum GridLevel {
+    Coarse,
+    Finest,
+}
+
+impl GridLevel {
+    fn max_iterations(self) -> usize {
+        match self {
+            GridLevel::Coarse => MAX_COARSE_ITERATIONS,
+            GridLevel::Finest => MAX_ITERATIONS,
+        }
+    }
+}
+
+/// Builds one map by one method, in one or more attempts.
+struct MapBuilder<'a, D> {
     field: &'a Heightfield,
+    spec: &'a MapSpec,
     density: D,
     minimizer: Minimizer<D>,
     progress: &'a mut dyn FnMut(MapProgress) -> ControlFlow<()>,
-    /// The last outcome; iterations and evaluations are sums.
-    outcome: Outcome,
+    /// Iterations so far.
+    iterations: usize,
+    /// Evaluations of the energy so far.
+    evaluations: usize,
     notes: Vec<String>,
     history: Vec<EnergyHistory>,
 }
 
-impl<D: Density> Run<'_, D> {
-    fn attempt(&mut self, spec: &MapSpec, points: Quadrature) -> Result<Attempt> {
-        let map = self.coarse_to_fine(spec, points)?;
-        Ok(self.measured(map, spec, points))
+impl<D: Density> MapBuilder<'_, D> {
+    /// From the coarsest grid to that of the specification.
+    fn attempt(&mut self, points: Quadrature) -> Result<Attempt> {
+        let (coarsest, halvings) = halvings(self.spec.cells(self.field.extent()));
+        let mut map = self.shear(coarsest)?;
+        for halved in halvings.into_iter().rev() {
+            map = self.minimized(&map, points, GridLevel::Coarse)?.0.refined(halved);
+        }
+        self.finest(&map, points)
     }
 
-    fn measured(&self, map: WarpMap, spec: &MapSpec, points: Quadrature) -> Attempt {
-        let report = MapReport::measure(&map, self.field, spec.method);
-        Attempt { map, report, outcome: self.outcome, points }
-    }
-
-    fn coarse_to_fine(&mut self, spec: &MapSpec, points: Quadrature) -> Result<WarpMap> {
-        let mut cells = spec.cells(self.field.extent());
-        let mut halvings = Vec::new();
-        loop {
-            let halve = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
-            if halve == [false; 3] {
+    /// Repeats a folded attempt with the settings of [`RETRIES`].
+    fn retried_while_folded(&mut self, mut best: Attempt) -> Result<Attempt> {
+        for (rule, factor) in RETRIES {
+            if best.report.inverted_points == 0 || self.density.may_fold() {
                 break;
             }
-            cells = std::array::from_fn(|d| if halve[d] { cells[d] / 2 } else { cells[d] });
-            halvings.push(halve);
+            let points = Quadrature { rule, torso_weight: factor * self.spec.torso_weight };
+            self.notes.push(format!(
+                "the map was folded between its quadrature points; it was built again with torso_weight {:.2}{}",
+                points.torso_weight,
+                if rule == Rule::Gauss { " and four Gauss points per cell and axis" } else { "" }
+            ));
+            best = best.or_better(self.attempt(points)?);
         }
-        let mut map = WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..spec.clone() })?;
-        for halve in halvings.into_iter().rev() {
-            map = self.minimized(&map, points, MAX_COARSE_ITERATIONS)?.refined(halve);
-        }
-        self.minimized(&map, points, MAX_ITERATIONS)
+        Ok(best)
     }
 
-    /// The minimizer on the grid of `start`, the map of a coarser grid.
-    fn minimized(&mut self, start: &WarpMap, points: Quadrature, iterations: usize) -> Result<WarpMap> {
-        let cells = start.cells();
-        let thickness = start.size()[2];
-        let shear =
-            WarpMap::shear(self.field, &MapSpec { cells: Some(cells), thickness, ..MapSpec::default() })?;
-        // What is fine on the coarser grid may fold when it is moved onto the ground that only this one sees: then that
-        // ground is grown in steps. The shear is never folded.
+    /// Halves the cells along x and y if that is worthwhile.
+    fn refined_if_worthwhile(&mut self, attempt: Attempt) -> Result<Attempt> {
+        if !worth_refining(self.spec, &attempt.report) {
+            return Ok(attempt);
+        }
+        let finer = self.finest(&attempt.map.refined([true, true, false]), attempt.points)?;
+        Ok(attempt.or_better(finer))
+    }
+
+    /// Adds to the report how the map was found.
+    fn finished(mut self, attempt: Attempt) -> (WarpMap, MapReport) {
+        let Attempt { map, mut report, minimized, .. } = attempt;
+        report.converged = minimized.converged;
+        report.energy = minimized.value;
+        report.iterations = self.iterations;
+        report.evaluations = self.evaluations;
+        report.history = self.history;
+        if !report.converged {
+            report.warnings.push(format!(
+                "the optimizer stopped before it converged (gᵀd is {:.1e} of the energy, not {TOLERANCE:.0e}), as happens where the terrain is too steep for the cells; the map could be better",
+                limits(MAX_ITERATIONS).relative(minimized.value, minimized.decrement)
+            ));
+        }
+        report.warnings.append(&mut self.notes);
+        (map, report)
+    }
+
+    /// Minimizes on the finest grid, from the map of a coarser one, and measures the result.
+    fn finest(&mut self, start: &WarpMap, points: Quadrature) -> Result<Attempt> {
+        let (map, minimized) = self.minimized(start, points, GridLevel::Finest)?;
+        let report = MapReport::measure(&map, self.field, self.spec.method);
+        Ok(Attempt { map, report, minimized, points })
+    }
+
+    /// Minimizes on the grid of `start`, the map of a coarser grid.
+    ///
+    /// A map that is injective on the coarser grid may fold when it is moved onto ground that only this grid resolves. Then that
+    /// ground grows in steps. If that fails, too, the minimizer starts from the shear, which is never folded.
+    fn minimized(
+        &mut self,
+        start: &WarpMap,
+        points: Quadrature,
+        level: GridLevel,
+    ) -> Result<(WarpMap, Minimized)> {
+        let shear = self.shear(start.cells())?;
         for (map, steps) in [(start, 1), (start, GROWTH_STEPS), (&shear, 1)] {
-            let mut problem = Problem::new(self.field, self.density, map, points)?;
-            let mut u = problem.coefficients(map);
-            let gap = problem.gap(&u);
-            let mut outcome = Outcome::default();
-            for step in 1..=steps {
-                problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
-                problem.seat(&mut u);
-                if iterations < MAX_ITERATIONS {
-                    problem.forgive_misfit(&u);
-                }
-                let iterations = if step < steps { GROWTH_ITERATIONS } else { iterations };
-                outcome = self.run(&mut problem, &mut u, cells, iterations)?;
-                if !outcome.value.is_finite() {
-                    break;
-                }
-            }
-            if outcome.value.is_finite() {
-                self.outcome.converged = outcome.converged;
-                self.outcome.value = outcome.value;
-                self.outcome.decrement = outcome.decrement;
-                return Ok(problem.to_map(&u, map));
+            if let Some(found) = self.grown(map, steps, points, level)? {
+                return Ok(found);
             }
         }
         Err(Error::Internal("the shear onto the terrain is folded".into()))
     }
 
-    /// One run of the optimizer; it is added to what has been spent.
-    fn run(
+    /// Minimizes from `map` while the ground grows, in steps, from the bottom of `map` to the terrain. None if the map folds.
+    fn grown(
         &mut self,
-        problem: &mut Problem<'_, D>,
-        u: &mut Vec<f64>,
+        map: &WarpMap,
+        steps: usize,
+        points: Quadrature,
+        level: GridLevel,
+    ) -> Result<Option<(WarpMap, Minimized)>> {
+        let mut problem = WarpProblem::new(self.field, self.density, map, points)?;
+        let mut u = problem.coefficients(map);
+        let gap = problem.gap(&u);
+        let mut minimized = Minimized::default();
+        for step in 1..=steps {
+            problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
+            problem.move_onto_ground(&mut u);
+            if level == GridLevel::Coarse {
+                problem.drop_dominant_misfit(&u);
+            }
+            let iterations = if step < steps { GROWTH_ITERATIONS } else { level.max_iterations() };
+            (u, minimized) = self.run_minimizer(&mut problem, u, map.cells(), iterations)?;
+            if !minimized.value.is_finite() {
+                return Ok(None);
+            }
+        }
+        Ok(Some((problem.to_map(&u, map), minimized)))
+    }
+
+    /// Runs the minimizer once and records its cost.
+    fn run_minimizer(
+        &mut self,
+        problem: &mut WarpProblem<'_, D>,
+        u: Vec<f64>,
         cells: [usize; 3],
         iterations: usize,
-    ) -> Result<Outcome> {
-        let limits = Limits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR };
+    ) -> Result<(Vec<f64>, Minimized)> {
+        let limits = limits(iterations);
         let mut energies = Vec::new();
-        let outcome = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {
+        let (u, minimized) = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {
             energies.push(energy);
-            (self.progress)(MapProgress {
-                cells,
-                iteration,
-                energy,
-                decrement: decrement / (energy.abs() + ENERGY_FLOOR),
-                tolerance: TOLERANCE,
-            })
+            let decrement = limits.relative(energy, decrement);
+            (self.progress)(MapProgress { cells, iteration, energy, decrement, tolerance: TOLERANCE })
         });
-        if outcome.interrupted {
-            return Err(Error::input("building the warp map was stopped before it was done"));
+        if minimized.interrupted {
+            return Err(Error::input("the warp map was stopped before it was finished"));
         }
         self.history.push(EnergyHistory { cells, energy: energies });
-        self.outcome.iterations += outcome.iterations;
-        self.outcome.evaluations += outcome.evaluations;
-        Ok(outcome)
+        self.iterations += minimized.iterations;
+        self.evaluations += minimized.evaluations;
+        Ok((u, minimized))
+    }
+
+    /// The shear on a grid with this many cells.
+    fn shear(&self, cells: [usize; 3]) -> Result<WarpMap> {
+        WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..self.spec.clone() })
+    }
+}
+
+/// The limits of all minimizers.
+fn limits(iterations: usize) -> StoppingLimits {
+    StoppingLimits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR }
+}
+
+/// The cells of the coarsest grid, and along which axes to halve the cells of `cells`, and those that result, to arrive there.
+fn halvings(mut cells: [usize; 3]) -> ([usize; 3], Vec<[bool; 3]>) {
+    let mut halvings = Vec::new();
+    loop {
+        let halved = cells.map(|n| n % 2 == 0 && n / 2 >= COARSEST);
+        if halved == [false; 3] {
+            return (cells, halvings);
+        }
+        cells = std::array::from_fn(|d| if halved[d] { cells[d] / 2 } else { cells[d] });
+        halvings.push(halved);
     }
 }

@@ -1,7 +1,7 @@
-//! Maps that were built before, by the content of what they depend on.
+//! A cache of maps on disk.
 //!
-//! A cache file holds one line of JSON (a header) and then the control points as little-endian floats. Its name is the
-//! SHA-256 of the terrain's samples, the specification and [`SOLVER_VERSION`].
+//! A cache file consists of a header, one line of JSON, and the control points as little-endian doubles. Its name is the SHA-256 hash
+//! of everything that a map depends on: the terrain's samples, the specification and [`SOLVER_VERSION`].
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -9,22 +9,24 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{MapProgress, MapReport, WarpMap, build};
+use super::build::{MapProgress, build};
+use super::report::MapReport;
+use super::spline::WarpMap;
 use crate::heightfield::Heightfield;
 use crate::scenario::MapSpec;
 use crate::{Error, Result, digest, files};
 
-/// To be raised with every change that makes a different map of the same terrain.
+/// Increase this with every change that yields a different map of the same terrain.
 const SOLVER_VERSION: u32 = 5;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
-    /// SHA-256 of what follows the header.
+    /// SHA-256 of the control points as stored.
     checksum: String,
     report: MapReport,
 }
 
-/// `$WARPGAIT_CACHE`, else `$XDG_CACHE_HOME/warpgait`, else `~/.cache/warpgait`; none where neither is set.
+/// `$WARPGAIT_CACHE`, or else `$XDG_CACHE_HOME/warpgait`, or else `~/.cache/warpgait`; none if none of these variables is set.
 pub fn default_cache_dir() -> Option<PathBuf> {
     let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     from("WARPGAIT_CACHE")
@@ -32,10 +34,10 @@ pub fn default_cache_dir() -> Option<PathBuf> {
         .or_else(|| from("HOME").map(|d| d.join(".cache").join("warpgait")))
 }
 
-/// As [`build`], but takes the map from `cache_dir` where it was built before, and keeps it there otherwise. The last value
-/// tells whether it came from the cache.
+/// Reads the map from `cache_dir`, or builds it with [`build`] and stores it there. The last value returned tells whether it came
+/// from the cache.
 ///
-/// A cache file that is damaged is built again and replaced. Where the cache cannot be written, the report has a warning.
+/// A damaged cache file is replaced. If the cache cannot be written, the report has a warning.
 ///
 /// # Errors
 /// Those of [`build`].
@@ -55,12 +57,12 @@ pub fn build_cached(
     }
     let (map, mut report) = build(field, spec, progress)?;
     if let Err(error) = write(&path, &map, &report) {
-        report.warnings.push(format!("the map could not be kept for next time ({error})"));
+        report.warnings.push(format!("the map could not be stored in the cache ({error})"));
     }
     Ok((map, report, false))
 }
 
-/// Everything a map depends on, hashed.
+/// The hash of everything that a map depends on.
 fn key(field: &Heightfield, spec: &MapSpec) -> String {
     let mut hash = Sha256::new();
     hash.update(SOLVER_VERSION.to_le_bytes());
@@ -75,7 +77,7 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
     digest::hex(&hash.finalize())
 }
 
-/// The map in a cache file; none if there is no such file or it is not whole.
+/// The map in a cache file; none if the file is missing or damaged.
 fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, MapReport)> {
     let bytes = std::fs::read(path).ok()?;
     let end = bytes.iter().position(|b| *b == b'\n')?;
@@ -84,7 +86,7 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     if digest::sha256_hex(payload) != header.checksum {
         return None;
     }
-    // The grid may be finer than the specification says, where it does not say.
+    // If the specification leaves the grid open, the one built may be finer than the default.
     let spec = MapSpec { cells: Some(header.report.cells), ..spec.clone() };
     let mut map = WarpMap::flat(field.extent(), &spec).ok()?;
     let points = map.control_points_mut();

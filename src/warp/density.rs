@@ -1,46 +1,53 @@
-//! Energy densities of the map: what makes a Jacobian cost something.
+//! Energy densities ρ(J) of the map: how much a Jacobian deviates from what a method aims at.
 
 use super::lanes::Lanes;
 
-/// An energy density ρ(J). Jacobians are flat: `[3 c + d]` = ∂φ_c/∂x̄_d, at a few points at once.
+/// An energy density ρ(J). Jacobians are flat, `[3 c + d]` = ∂φ_c/∂x̄_d, and come for several points at once.
 pub(super) trait Density: Copy {
     /// ρ and ∂ρ/∂J; ρ is infinite where J is not allowed.
     fn at(&self, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]);
 
-    /// The energy about a conformal map is close to ½∫ (a‖∇u‖² + (b − a) Σ (∂u_c/∂x̄_c)²): a and b, for the preconditioner.
+    /// a and b, for the preconditioner, of ½∫ (a‖∇u‖² + (b − a) Σ (∂u_c/∂x̄_c)²), the approximate energy of a small displacement u
+    /// from a conformal map.
     ///
-    /// By default those of ½(½‖∇u‖² + ⅙(div u)²), to which energies that ask for angles alone come.
+    /// By default those of ½(½‖∇u‖² + ⅙(div u)²), which is what energies of angles alone amount to.
     fn stiffness(&self) -> [f64; 2] {
         [0.5, 2.0 / 3.0]
     }
 
-    /// Weight over z̄, in m: the ground matters most, the torso's surroundings and all above them as much as `torso` says.
+    /// Weight at the height z̄, m: greatest at the ground, and close to `torso` at the torso and above.
     fn weight(&self, z: f64, torso: f64) -> f64 {
         weight(z, torso)
     }
 
-    /// Weight of the bottom face against the volume, m.
+    /// Weight of the bottom face relative to the volume, m.
     fn face_weight(&self) -> f64 {
         FACE_WEIGHT
     }
 
-    /// Whether a minimizer may be folded where the terrain is steep.
+    /// Whether a minimizer may fold where the terrain is steep.
     fn may_fold(&self) -> bool {
         false
     }
 }
 
-/// The weight over z̄ of the energies that are to be small where the feet are.
+/// Height over which the weight falls by a factor of e, m: feet swing below it.
+const WEIGHT_DECAY: f64 = 0.25;
+
+/// The weight over z̄ of the energies that should be small where the feet are.
 pub(super) fn weight(z: f64, torso: f64) -> f64 {
-    (-z / 0.25).exp() + torso
+    (-z / WEIGHT_DECAY).exp() + torso
 }
 
-/// The face weight of the same. At 0.7 the mean conformal error at the ground is a third larger, at torso height a thirtieth
-/// smaller (`mips`, the benchmark's terrains but the pit).
+/// The face weight of these energies. At 0.7 the mean conformal error is a third larger at the ground and a thirtieth smaller at
+/// torso height (`mips`, all of the benchmark's terrains except the pit).
 pub(super) const FACE_WEIGHT: f64 = 1.0;
 
-/// The scale-invariant mean of the squared singular values, ρ = ¼(‖J‖² / det^⅔ − 3): zero where J is a scaled rotation
-/// (by the inequality of the means), infinite where space would fold.
+/// Determinants up to this count as folded. Also the least argument of [`inverse_cube_root`].
+pub(super) const MIN_DET: f64 = 1e-12;
+
+/// ρ = ¼(‖J‖² / det^⅔ − 3) = ¾(A/G − 1), with A and G the arithmetic and the geometric mean of the squared singular values: zero
+/// where J is a scaled rotation, positive elsewhere, infinite where space folds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mips;
 
@@ -48,7 +55,7 @@ impl Density for Mips {
     #[inline(always)]
     fn at(&self, j: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
         let cofactor = cofactors(j);
-        let det = j[0] * cofactor[0] + j[1] * cofactor[1] + j[2] * cofactor[2];
+        let det = determinant(j, &cofactor);
         let mut norm = j[0] * j[0];
         for v in &j[1..] {
             norm += *v * *v;
@@ -85,21 +92,18 @@ pub(super) fn cofactors(j: &[Lanes; 9]) -> [Lanes; 9] {
     ]
 }
 
-/// det J.
+/// det J, given cof J.
 #[inline(always)]
-pub(super) fn determinant(j: &[Lanes; 9]) -> Lanes {
-    let cofactor = cofactors(j);
+pub(super) fn determinant(j: &[Lanes; 9], cofactor: &[Lanes; 9]) -> Lanes {
     j[0] * cofactor[0] + j[1] * cofactor[1] + j[2] * cofactor[2]
 }
 
-/// Determinants up to here count as folded; it keeps the powers below within range.
-const MIN_DET: f64 = 1e-12;
-
-/// x^(−⅓) for 1e-12 ≤ x ≤ 1e30, to rounding: a guess from the exponent, sharpened by Newton's method y ← y(4 − x y³)/3.
+/// x^(−⅓) for 1e-12 ≤ x ≤ 1e30, to rounding: a guess from the exponent, refined by Newton's method y ← y(4 − x y³)/3.
 #[inline(always)]
 fn inverse_cube_root(x: Lanes) -> Lanes {
-    // The bits of a float are close to a linear function of its logarithm; this constant makes the error even.
-    let mut y = x.map(|x| f64::from(f32::from_bits(0x54a2_1d2a - (x as f32).to_bits() / 3)));
+    // The bits of a float are close to a linear function of its logarithm; this constant balances the error.
+    const MAGIC: u32 = 0x54a2_1d2a;
+    let mut y = x.map(|x| f64::from(f32::from_bits(MAGIC - (x as f32).to_bits() / 3)));
     for _ in 0..4 {
         y = (1.0 / 3.0) * y * (Lanes::splat(4.0) - x * y * (y * y));
     }

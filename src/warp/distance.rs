@@ -1,22 +1,22 @@
-//! Energies that are distances, ½‖J − T(J)‖², from the matrix that J had better be.
+//! Energy densities that are distances, ½‖J − T(J)‖², of J from a target matrix.
 
 use super::density::Density;
 use super::lanes::Lanes;
 use super::singular::Singular;
 use crate::scenario::MapScale;
 
-/// ρ = ½‖J − T‖², T a function of J. Such an energy does not keep space from folding.
+/// ρ = ½‖J − T‖², T a function of J. Such an energy does not prevent folding.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Distance {
-    /// T = 1, Dirichlet's energy of the displacement φ − x̄: its minimizers are harmonic.
+    /// T = 1, the Dirichlet energy of the displacement φ − x̄, whose minimizers are harmonic.
     Identity,
     /// T = U Vᵀ, the nearest rotation.
     Rotation,
-    /// T = s U Vᵀ, a scaled rotation (Section IV-B).
+    /// T = s U Vᵀ, a scaled rotation: half the paper's ρ of Eq. 6 with μ = 0.
     Similarity(MapScale),
 }
 
-/// The scale s of the target: |Σ|^⅓ as in the paper, or tr Σ/3, which minimizes ‖Σ − s 1‖².
+/// The scale s of the target: |Σ|^⅓ as printed in the paper, or tr Σ/3, which minimizes ‖Σ − s 1‖².
 #[inline]
 pub(super) fn scale(kind: MapScale, sigma: &[Lanes; 3]) -> Lanes {
     match kind {
@@ -26,8 +26,8 @@ pub(super) fn scale(kind: MapScale, sigma: &[Lanes; 3]) -> Lanes {
 }
 
 impl Density for Distance {
-    /// ρ and J − T. This is ∂ρ/∂J where T is the nearest of its kind (by the envelope theorem), and the derivative with T
-    /// frozen where it is not, that is, for |Σ|^⅓: all that Algorithm 1 asks for.
+    /// ρ and J − T. By the envelope theorem this is ∂ρ/∂J if T is the nearest matrix of its kind. For |Σ|^⅓ it is not, and
+    /// J − T is the derivative with T frozen, which is all that Algorithm 1 needs.
     #[inline]
     fn at(&self, j: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
         let mut gradient = *j;
@@ -48,7 +48,7 @@ impl Density for Distance {
         (half_square(&gradient), gradient)
     }
 
-    /// Of ½‖∇u‖² for harmonic maps and for Algorithm 1, which freezes T; of ½‖sym ∇u‖² about a rotation.
+    /// That of ½‖∇u‖² for harmonic maps and for Algorithm 1, which freezes T; that of ½‖sym ∇u‖² for rotations.
     fn stiffness(&self) -> [f64; 2] {
         match self {
             Distance::Rotation => [0.5, 1.0],
@@ -56,7 +56,7 @@ impl Density for Distance {
         }
     }
 
-    /// Laplace's equation asks for an even weight.
+    /// Laplace's equation needs a constant weight.
     fn weight(&self, z: f64, torso: f64) -> f64 {
         match self {
             Distance::Identity => 1.0,
@@ -76,7 +76,7 @@ impl Density for Distance {
     }
 }
 
-/// ½‖∇φ‖² itself, whose gradient is the stiffness matrix times the coefficients.
+/// ½‖J‖², whose energy has the stiffness matrix times the coefficients as its gradient.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Norm;
 

@@ -1,109 +1,99 @@
-//! Gauss–Newton with a line search that stays where space is not folded.
+//! Gauss–Newton with a line search that keeps space from folding: the paper's second solver of Eq. 6, for μ > 0 (Section IV-B).
 //!
-//! The linear systems are solved by conjugate gradients with the tensor-product preconditioner. A sparse factorization is no
-//! match for that: tri-cubic splines couple each coefficient with 343 others in each of three components, and the factor fills.
+//! The linear systems are solved by conjugate gradients with the tensor-product preconditioner. A sparse factorization is slower:
+//! tri-cubic splines couple each coefficient with 343 others in each of three components, and the factor fills in.
 
-use std::ops::ControlFlow;
-
-use super::barrier::{Barrier, Curvature};
-use super::lbfgs::{Limits, Objective, Outcome, add, dot};
+use super::barrier::{Barrier, BarrierCurvature};
 use super::line_search::backtrack;
-use super::problem::Problem;
+use super::objective::{Iterate, Minimized, Objective, Observer, StoppingLimits, add, dot};
+use super::problem::WarpProblem;
 
-/// Where it settles it does so within two dozen, and each is dear.
+/// Where it converges it takes less than two dozen iterations, and each is expensive.
 const MAX_ITERATIONS: usize = 60;
-/// Conjugate gradients by iteration, at most. (With 20 it takes three times as many iterations on the hard hill.)
+/// Conjugate-gradient iterations per Gauss–Newton iteration, at most. (With 20, the hard hill takes three times as many of the latter.)
 const MAX_INNER: usize = 40;
-/// A step that had to be cut, for it folds space somewhere, asks for damping in the next, of the points that are about to fold
-/// (`Barrier::curvature`). Least and greatest, and by how much it changes. (With an even damping, K, steps stayed cut to a 16th:
-/// one point on the way to its fold keeps back all.)
+/// Residual of a linear system relative to the gradient, in the norm of the preconditioner, at which it counts as solved.
+const FORCING: f64 = 0.1;
+/// A step that had to be cut because it folds space somewhere makes the next one damped, at the points that are about to fold
+/// (`Barrier::curvature`): the least and the greatest damping. (With a uniform damping by the stiffness matrix, steps stayed at a
+/// sixteenth: one point close to folding holds back all others.)
 const DAMPING: [f64; 2] = [0.01, 10.0];
+/// By how much the damping grows after a step that was cut, and shrinks after one that was not.
 const DAMPING_FACTOR: f64 = 4.0;
 
-/// Minimizes from u, which must not be folded. `progress` sees the iteration, the energy and gᵀd, d the step.
+/// Minimizes from u and returns where it ends. Does nothing if space is folded at u. The observer receives gᵀd, d the step, as the
+/// decrement.
 pub(super) fn gauss_newton(
-    problem: &mut Problem<'_, Barrier>,
-    u: &mut Vec<f64>,
-    limits: Limits,
-    progress: &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
-) -> Outcome {
-    let mut gradient = vec![0.0; u.len()];
-    let mut value = problem.evaluate(u, &mut gradient);
-    let mut outcome = Outcome { evaluations: 1, value, ..Outcome::default() };
-    if !value.is_finite() {
-        return outcome;
+    problem: &mut WarpProblem<'_, Barrier>,
+    u: Vec<f64>,
+    limits: StoppingLimits,
+    observer: &mut Observer,
+) -> (Vec<f64>, Minimized) {
+    let limits = limits.at_most(MAX_ITERATIONS);
+    let mut current = Iterate::new(problem, u);
+    let mut minimized = Minimized::begun(current.value);
+    if !current.value.is_finite() {
+        return (current.x, minimized);
     }
-    let mut trial = u.clone();
-    let mut trial_gradient = gradient.clone();
+    let mut trial = current.clone();
     let mut damping = 0.0;
     loop {
-        let mut step = newton_step(problem, u, &gradient, damping);
-        let mut decrement = dot(&step, &gradient);
-        let tolerance = limits.tolerance * (value.abs() + limits.floor);
-        if decrement <= tolerance && damping > 0.0 {
-            // Short steps are no sign of a minimum where damping made them short.
+        let (mut step, mut decrement) = newton_step(problem, &current, damping);
+        if damping > 0.0 && limits.are_met(current.value, decrement) {
+            // A short step does not indicate a minimum if damping made it short.
             damping = 0.0;
-            step = newton_step(problem, u, &gradient, damping);
-            decrement = dot(&step, &gradient);
+            (step, decrement) = newton_step(problem, &current, damping);
         }
-        (outcome.value, outcome.decrement) = (value, decrement);
-        if progress(outcome.iterations, value, decrement).is_break() {
-            outcome.interrupted = true;
-            return outcome;
+        if minimized.must_stop(current.value, decrement, &limits, observer) {
+            break;
         }
-        if decrement <= tolerance {
-            outcome.converged = true;
-            return outcome;
-        }
-        if outcome.iterations >= limits.iterations.min(MAX_ITERATIONS) {
-            return outcome;
-        }
-        let accepted = backtrack(
-            problem,
-            u,
-            value,
-            &step,
-            decrement,
-            &mut trial,
-            &mut trial_gradient,
-            &mut outcome.evaluations,
-        );
-        let Some(accepted) = accepted else { return outcome };
-        damping = match accepted.scale < 1.0 {
-            true => (DAMPING_FACTOR * damping).clamp(DAMPING[0], DAMPING[1]),
-            false if damping > DAMPING[0] => damping / DAMPING_FACTOR,
-            false => 0.0,
+        let evaluations = &mut minimized.evaluations;
+        let Some(scale) = backtrack(problem, &current, &step, decrement, &mut trial, evaluations) else {
+            break;
         };
-        std::mem::swap(u, &mut trial);
-        std::mem::swap(&mut gradient, &mut trial_gradient);
-        value = accepted.value;
-        outcome.iterations += 1;
+        damping = next_damping(damping, scale < 1.0);
+        std::mem::swap(&mut current, &mut trial);
+        minimized.iterations += 1;
+    }
+    (current.x, minimized)
+}
+
+/// More after a step that was cut; less, and in the end none, after full steps.
+fn next_damping(damping: f64, cut: bool) -> f64 {
+    let [least, greatest] = DAMPING;
+    if cut {
+        (DAMPING_FACTOR * damping).clamp(least, greatest)
+    } else if damping > least {
+        damping / DAMPING_FACTOR
+    } else {
+        0.0
     }
 }
 
-/// (H + damping D)⁻¹ g, to a residual that falls with the gradient, by preconditioned conjugate gradients.
-fn newton_step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
-    let linearized = problem.linearized(u, |density, jacobian| density.curvature(jacobian, damping));
+/// The step d = (H + damping D)⁻¹ g by preconditioned conjugate gradients, and gᵀd.
+fn newton_step(problem: &mut WarpProblem<'_, Barrier>, current: &Iterate, damping: f64) -> (Vec<f64>, f64) {
+    let gradient = &current.gradient;
+    let linearized = problem.linearized(&current.x, |density, jacobian| density.curvature(jacobian, damping));
     let mut step = vec![0.0; gradient.len()];
-    let mut rest = gradient.to_vec();
-    let mut conditioned = rest.clone();
+    let mut residual = gradient.clone();
+    let mut conditioned = residual.clone();
     problem.precondition(&mut conditioned);
     let mut direction = conditioned.clone();
     let mut product = vec![0.0; gradient.len()];
-    let first = dot(&rest, &conditioned);
+    let first = dot(&residual, &conditioned);
     let mut square = first;
     for _ in 0..MAX_INNER {
-        problem.curved(&linearized, Curvature::times, &mut direction, &mut product);
+        problem.gauss_newton_product(&linearized, BarrierCurvature::times, &mut direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature <= 0.0 {
             break;
         }
         let length = square / curvature;
         add(&mut step, length, &direction);
-        add(&mut rest, -length, &product);
-        conditioned.copy_from_slice(&rest);
+        add(&mut residual, -length, &product);
+        conditioned.copy_from_slice(&residual);
         problem.precondition(&mut conditioned);
-        let next = dot(&rest, &conditioned);
+        let next = dot(&residual, &conditioned);
         if next <= FORCING * FORCING * first {
             break;
         }
@@ -113,8 +103,6 @@ fn newton_step(problem: &mut Problem<'_, Barrier>, u: &[f64], gradient: &[f64], 
             *d = c + ratio * *d;
         }
     }
-    step
+    let decrement = dot(&step, gradient);
+    (step, decrement)
 }
-
-/// The residual of a linear system, in the preconditioner's norm, relative to the gradient.
-const FORCING: f64 = 0.1;

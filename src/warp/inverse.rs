@@ -1,24 +1,29 @@
-//! φ⁻¹ by damped Newton iterations.
+//! φ⁻¹ by a damped Newton method.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::{Order, WarpMap};
+use super::spline::{Order, WarpMap};
 use crate::{Error, Result};
 
-/// Residual at which a point counts as found, m.
+/// Residual of a solution, m.
 const TOLERANCE: f64 = 1e-11;
+/// Residual of a solution where rounding errors stall the method, m.
+const STALLED_TOLERANCE: f64 = 100.0 * TOLERANCE;
+/// Steps shorter than this fraction of Newton's do not decrease the residual, except by rounding errors.
+const LEAST_SCALE: f64 = 1e-6;
+/// Quadratic convergence takes far fewer; more would not help.
 const MAX_ITERATIONS: usize = 60;
-/// Steps of the continuation that is tried where Newton's method fails from the first guess.
+/// Numbers of continuation steps, tried in order where Newton's method fails from the guess.
 const CONTINUATION_STEPS: [usize; 2] = [8, 64];
 
 impl WarpMap {
     /// x̄ with φ(x̄) = p.
     ///
     /// # Errors
-    /// When p is not finite, lies further from the box than the box is large, or no such x̄ is found.
+    /// If p is not finite or is further from the box than its longest edge, or if no such x̄ is found.
     pub fn inverse(&self, p: [f64; 3]) -> Result<[f64; 3]> {
         self.check_near(&p)?;
-        // Over the ground at the same x, y, at the same height above it.
+        // The guess has the same x, y and the same height above the ground.
         let ground = self.position([p[0], p[1], 0.0])[2];
         let guess = Vector3::new(p[0], p[1], p[2] - ground);
         let step = |x: &Vector3<f64>, target: &Vector3<f64>| {
@@ -32,10 +37,10 @@ impl WarpMap {
         self.checked(found.map(|x| x.into()), &p)
     }
 
-    /// x̄, ȳ with φ_xy(x̄, ȳ, 0) = (x, y): the point of F under a point of the ground.
+    /// x̄, ȳ with φ_xy(x̄, ȳ, 0) = (x, y): the point of F that belongs to a point of the ground.
     ///
     /// # Errors
-    /// As for [`WarpMap::inverse`].
+    /// Those of [`WarpMap::inverse`].
     pub fn ground_inverse(&self, xy: [f64; 2]) -> Result<[f64; 2]> {
         self.check_near(&xy)?;
         let step = |x: &Vector2<f64>, target: &Vector2<f64>| {
@@ -52,7 +57,7 @@ impl WarpMap {
         self.checked(found.map(|x| x.into()), &xy)
     }
 
-    /// Refuses points that are further from the box than the box is large.
+    /// Rejects points that are further from the box than its longest edge.
     fn check_near<const D: usize>(&self, p: &[f64; D]) -> Result<()> {
         let (origin, size) = (self.origin(), self.size());
         let reach = size.iter().fold(0.0, |a: f64, b| a.max(*b));
@@ -61,7 +66,7 @@ impl WarpMap {
             return Ok(());
         }
         Err(Error::input(format!(
-            "the point {p:?} m lies far outside of the warp map, which covers x {:.2} … {:.2}, y {:.2} … {:.2} m; keep to the terrain or enlarge it",
+            "the point {p:?} m is far outside the warp map, which covers x {:.2} … {:.2}, y {:.2} … {:.2} m; stay on the terrain or enlarge it",
             origin[0],
             origin[0] + size[0],
             origin[1],
@@ -69,10 +74,11 @@ impl WarpMap {
         )))
     }
 
+    /// Rejects a solution that is missing or far from the box.
     fn checked<const D: usize>(&self, found: Option<[f64; D]>, p: &[f64; D]) -> Result<[f64; D]> {
         let x = found.ok_or_else(|| {
             Error::input(format!(
-                "no point of warped space was found that maps to {p:?} m; the warp map is folded there or does not reach it (see the map's report)"
+                "no point of warped space was found that maps to {p:?} m; the warp map is folded there or does not cover it (see the map's report)"
             ))
         })?;
         self.check_near(&x)?;
@@ -80,7 +86,7 @@ impl WarpMap {
     }
 }
 
-/// Newton from the guess; where that fails, along the straight way from the guess's image to the target.
+/// Newton's method from the guess; where it fails, by continuation along the straight line from the guess's image to the target.
 fn solve<V: Point>(
     guess: V,
     target: V,
@@ -101,33 +107,32 @@ fn solve<V: Point>(
     })
 }
 
-/// Damped Newton: the step is halved until the residual falls.
+/// Damped Newton method: each step is halved until the residual decreases.
 fn newton<V: Point>(mut x: V, target: &V, step: &impl Fn(&V, &V) -> (f64, Option<V>)) -> Option<V> {
     let (mut residual, mut direction) = step(&x, target);
     for _ in 0..MAX_ITERATIONS {
         if residual < TOLERANCE {
             return Some(x);
         }
-        let towards = direction?;
+        let full_step = direction?;
         let mut scale = 1.0;
         loop {
-            let next = x - towards * scale;
+            let next = x - full_step * scale;
             let (next_residual, next_direction) = step(&next, target);
             if next_residual < residual {
                 (x, residual, direction) = (next, next_residual, next_direction);
                 break;
             }
             scale *= 0.5;
-            if scale < 1e-6 {
-                // Rounding, not a wrong direction, stops it close to the solution.
-                return (residual < 100.0 * TOLERANCE).then_some(x);
+            if scale < LEAST_SCALE {
+                return (residual < STALLED_TOLERANCE).then_some(x);
             }
         }
     }
     None
 }
 
-/// What Newton's method needs of a vector.
+/// A vector in two or three dimensions.
 trait Point:
     Copy + std::ops::Sub<Output = Self> + std::ops::Add<Output = Self> + std::ops::Mul<f64, Output = Self>
 {

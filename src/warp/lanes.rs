@@ -1,18 +1,18 @@
-//! A few numbers at once, so that arithmetic on quadrature points is vectorized.
+//! Several numbers at once, so that the compiler vectorizes arithmetic on quadrature points.
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// How many. (Loops rather than array functions below: compilers inline and vectorize these reliably.)
+/// How many: one vector register of AVX, two of SSE2. (Loops are used below because, unlike array functions, they reliably vectorize.)
 pub(super) const LANES: usize = 4;
 
-/// One number at each of a few points.
+/// One number for each of several points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lanes(pub [f64; LANES]);
 
 impl Lanes {
     pub const ZERO: Lanes = Lanes([0.0; LANES]);
 
-    /// The same number at all points.
+    /// The same number for all points.
     #[inline(always)]
     pub fn splat(value: f64) -> Lanes {
         Lanes([value; LANES])
@@ -32,7 +32,7 @@ impl Lanes {
         self.0.iter().sum()
     }
 
-    /// The numbers of a slice of blocks, one after the other.
+    /// The numbers of several blocks in order.
     pub fn flat(blocks: &[Lanes]) -> impl Iterator<Item = &f64> {
         blocks.iter().flat_map(|b| &b.0)
     }

@@ -1,48 +1,40 @@
-//! Backtracking to a sufficient decrease, for the minimizers that have a gradient.
+//! Backtracking line search (Armijo's rule).
 
-use super::lbfgs::Objective;
+use super::objective::{Iterate, Objective};
 
+/// The decrease asked of a step, as a fraction of the decrease to first order.
 const SUFFICIENT_DECREASE: f64 = 1e-4;
+/// After so many cuts, at least 2⁻³⁰ of the step, a decrease would be lost in rounding.
 const MAX_BACKTRACKS: usize = 30;
-/// By how much a step is cut that does not decrease the value enough, and one to where it is infinite, that is, to a fold.
-const CUT: [f64; 2] = [0.5, 0.3];
+/// Factor of a step that does not decrease the value enough.
+const CUT: f64 = 0.5;
+/// Factor of a step to where the value is infinite, that is, where space folds.
+const FOLD_CUT: f64 = 0.3;
 
-/// A step that was taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Accepted {
-    /// The value at its end.
-    pub value: f64,
-    /// Its length, of the whole step.
-    pub scale: f64,
-}
-
-/// Armijo's rule along x − scale · `direction`: the first of the scales 1, ½, ¼, … whose value is low enough; none where rounding
-/// comes first. `value` is that at x, `decrement` is gᵀ `direction`.
+/// Moves along x − scale · `direction` from `current` with the first of the scales 1, ½, ¼, … that decreases the value enough, and
+/// returns that scale; none where there is none. `decrement` is gᵀ `direction`.
 ///
-/// The accepted point and its gradient are left in `trial` and `trial_gradient`; `evaluations` counts.
-#[allow(clippy::too_many_arguments)] // where it stands, where it goes, and room for that
+/// The accepted point is in `trial`; `evaluations` counts the objective's.
 pub(super) fn backtrack(
     objective: &mut impl Objective,
-    x: &[f64],
-    value: f64,
+    current: &Iterate,
     direction: &[f64],
     decrement: f64,
-    trial: &mut [f64],
-    trial_gradient: &mut [f64],
+    trial: &mut Iterate,
     evaluations: &mut usize,
-) -> Option<Accepted> {
+) -> Option<f64> {
     let mut scale = 1.0;
     for _ in 0..MAX_BACKTRACKS {
-        for ((t, x), d) in trial.iter_mut().zip(x).zip(direction) {
+        for ((t, x), d) in trial.x.iter_mut().zip(&current.x).zip(direction) {
             *t = x - scale * d;
         }
-        let next = objective.evaluate(trial, trial_gradient);
+        trial.value = objective.evaluate(&mut trial.x, &mut trial.gradient);
         *evaluations += 1;
-        // An infinite value fails this.
-        if next <= value - SUFFICIENT_DECREASE * scale * decrement {
-            return Some(Accepted { value: next, scale });
+        // False for an infinite value.
+        if trial.value <= current.value - SUFFICIENT_DECREASE * scale * decrement {
+            return Some(scale);
         }
-        scale *= CUT[usize::from(!next.is_finite())];
+        scale *= if trial.value.is_finite() { CUT } else { FOLD_CUT };
     }
     None
 }

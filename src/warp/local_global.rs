@@ -1,44 +1,34 @@
-//! Algorithm 1: the target of every point by itself (local), then all coefficients at once (global), in turn.
-
-use std::ops::ControlFlow;
+//! Algorithm 1, the paper's first solver of Eq. 6, for μ = 0: alternately the target of each point by itself (local) and all
+//! coefficients at once (global).
 
 use super::density::Density;
-use super::lbfgs::{Limits, Outcome};
-use super::problem::Problem;
+use super::objective::{Minimized, Observer, StoppingLimits};
+use super::problem::WarpProblem;
 
-/// Where it settles it does so within a few dozen rounds; over folded places it wanders without end.
+/// Where it converges it takes a few dozen rounds; where the map is folded it never does.
 const MAX_ROUNDS: usize = 150;
 
-/// Alternates from u. `progress` sees the iteration, the energy and the square of the last step in the energy's norm.
+/// Alternates from u and returns where it ends. The observer receives the square of the last step, in the norm of the energy, as the decrement.
 ///
-/// The ground under the bottom is frozen in each round, and nothing of its slope reaches the points of the map: the energy
-/// need not fall, and where it settles is no minimum.
+/// Each round freezes the ground under the bottom face, and with it the ground's slope. So the energy may rise, and the limit is not
+/// a minimum of Eq. 6.
 pub(super) fn alternate<D: Density>(
-    problem: &mut Problem<D>,
-    u: &mut [f64],
-    limits: Limits,
-    progress: &mut dyn FnMut(usize, f64, f64) -> ControlFlow<()>,
-) -> Outcome {
-    let mut scratch = [vec![0.0; u.len()], vec![0.0; u.len()]];
-    let mut outcome = Outcome::default();
+    problem: &mut WarpProblem<'_, D>,
+    mut u: Vec<f64>,
+    limits: StoppingLimits,
+    observer: &mut Observer,
+) -> (Vec<f64>, Minimized) {
+    let limits = limits.at_most(MAX_ROUNDS);
+    let mut minimized = Minimized::default();
     loop {
-        let (value, decrement) = problem.alternate(u, &mut scratch);
-        (outcome.value, outcome.decrement) = (value, decrement);
-        outcome.evaluations += 1;
-        if progress(outcome.iterations, value, decrement).is_break() {
-            outcome.interrupted = true;
+        let (value, decrement) = problem.alternate(&mut u);
+        minimized.evaluations += 1;
+        if minimized.must_stop(value, decrement, &limits, observer) || !value.is_finite() {
             break;
         }
-        if decrement <= limits.tolerance * (value + limits.floor) {
-            outcome.converged = true;
-            break;
-        }
-        if outcome.iterations >= limits.iterations.min(MAX_ROUNDS) || !value.is_finite() {
-            break;
-        }
-        outcome.iterations += 1;
+        minimized.iterations += 1;
     }
-    // The bottom is on the ground of the round before.
-    problem.seat(u);
-    outcome
+    // The bottom face is still on the ground of the last round's start.
+    problem.move_onto_ground(&mut u);
+    (u, minimized)
 }

@@ -1,11 +1,13 @@
-//! The inverse of a stiffness matrix on the tensor grid by fast diagonalization.
+//! The inverse of a stiffness matrix on the tensor grid, by fast diagonalization.
 //!
-//! Every energy here is, for small deviations from a conformal map and but for what couples the components, like stiffnesses of
-//! a across and b along axis c for component c (`Density::stiffness`). On a tensor grid with weights that are products,
+//! For small deviations from a conformal map, and without the coupling of the components, every energy is that of a stiffness a across
+//! and b along axis c for component c (`Density::stiffness`). On a tensor grid whose weights are products,
 //!
 //!   K_c = a₀ K⊗M⊗M + a₁ M⊗K⊗M + a₂ M⊗M⊗K,
 //!
-//! and with K v = λ M v solved on each axis (VᵀMV = 1), K_c⁻¹ = V (a₀λ₀ + a₁λ₁ + a₂λ₂)⁻¹ Vᵀ, V = V₀⊗V₁⊗V₂.
+//! and with the solutions of K v = λ M v on each axis (VᵀMV = 1), K_c⁻¹ = V (a₀λ₀ + a₁λ₁ + a₂λ₂)⁻¹ Vᵀ, V = V₀⊗V₁⊗V₂.
+
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, SymmetricEigen};
 
@@ -18,54 +20,38 @@ pub(super) struct Preconditioner {
     scratch: [Vec<f64>; 2],
 }
 
+/// K_c⁻¹ for one component.
 struct Component {
-    /// By axis (n × free), rows of fixed coefficients zero.
+    /// V by axis (n × free); rows of fixed coefficients are zero.
     vectors: [DMatrix<f64>; 3],
+    /// Vᵀ by axis.
     transposed: [DMatrix<f64>; 3],
     /// 1/(a₀λ₀ + a₁λ₁ + a₂λ₂), (free₀, free₁, free₂) in C order.
     inverse: Vec<f64>,
 }
 
+/// Least eigenvalue of K_c relative to the greatest. A component that is fixed nowhere has a null space; this keeps the inverse
+/// finite there.
+const LEAST_EIGENVALUE: f64 = 1e-9;
+
 impl Preconditioner {
-    /// `samples` carry the weights; `free[c][d]`: which coefficients of component c may move along axis d;
-    /// `[across, along]`: the stiffness of component c across and along axis c.
+    /// `samples` are the points of each axis with their weights; `free[c][d]` are the indices along axis d at which component c is free;
+    /// `[across, along]` is the stiffness of component c across and along axis c.
     ///
     /// # Errors
-    /// Internal, when a mass matrix is not positive definite (weights that are not).
+    /// Internal, if a mass matrix is not positive definite (because its weights are not positive).
     pub fn new(
         samples: [&[Sample]; 3],
-        free: [[std::ops::Range<usize>; 3]; 3],
+        free: [[Range<usize>; 3]; 3],
         [across, along]: [f64; 2],
     ) -> Result<Preconditioner> {
         let pencils = samples.map(pencil);
-        let mut components = Vec::with_capacity(3);
-        for (c, free) in free.iter().enumerate() {
-            let mut vectors = Vec::with_capacity(3);
-            let mut values = Vec::with_capacity(3);
-            for d in 0..3 {
-                let (v, lambda) = eigen(&pencils[d], &free[d])?;
-                let stiffness = if c == d { along } else { across };
-                vectors.push(v);
-                values.push(lambda.iter().map(|l| stiffness * l.max(0.0)).collect::<Vec<f64>>());
-            }
-            let mut inverse = Vec::with_capacity(values.iter().map(Vec::len).product());
-            let greatest = values.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
-            for a in &values[0] {
-                for b in &values[1] {
-                    // A component that nothing pins would have a null space: the floor leaves it movable.
-                    inverse.extend(values[2].iter().map(|c| 1.0 / (a + b + c).max(1e-9 * greatest)));
-                }
-            }
-            let vectors: [DMatrix<f64>; 3] =
-                vectors.try_into().map_err(|_| Error::Internal("three axes".into()))?;
-            components.push(Component {
-                transposed: std::array::from_fn(|d| vectors[d].transpose()),
-                vectors,
-                inverse,
-            });
-        }
-        let components = components.try_into().map_err(|_| Error::Internal("three components".into()))?;
-        Ok(Preconditioner { components, scratch: [Vec::new(), Vec::new()] })
+        let stiffness = |c: usize| std::array::from_fn(|d| if c == d { along } else { across });
+        let component = |c: usize| Component::new(&pencils, &free[c], stiffness(c));
+        Ok(Preconditioner {
+            components: [component(0)?, component(1)?, component(2)?],
+            scratch: [Vec::new(), Vec::new()],
+        })
     }
 
     /// `v` ← K⁻¹ `v`, for vectors (component, x, y, z) in C order.
@@ -85,7 +71,32 @@ impl Preconditioner {
     }
 }
 
-/// (A₀⊗A₁⊗A₂) u in `out`, with `scratch` for what is between.
+impl Component {
+    /// From stiffness and mass matrix, free indices and stiffness by axis.
+    fn new(
+        pencils: &[[DMatrix<f64>; 2]; 3],
+        free: &[Range<usize>; 3],
+        stiffness: [f64; 3],
+    ) -> Result<Component> {
+        let eigen = |d: usize| -> Result<(DMatrix<f64>, Vec<f64>)> {
+            let (vectors, values) = eigen(&pencils[d], &free[d])?;
+            Ok((vectors, values.iter().map(|l| stiffness[d] * l.max(0.0)).collect()))
+        };
+        let ((v0, values0), (v1, values1), (v2, values2)) = (eigen(0)?, eigen(1)?, eigen(2)?);
+        let all = values0.iter().chain(&values1).chain(&values2);
+        let least = LEAST_EIGENVALUE * all.fold(0.0, |a: f64, b| a.max(*b));
+        let mut inverse = Vec::with_capacity(values0.len() * values1.len() * values2.len());
+        for a in &values0 {
+            for b in &values1 {
+                inverse.extend(values2.iter().map(|c| 1.0 / (a + b + c).max(least)));
+            }
+        }
+        let vectors = [v0, v1, v2];
+        Ok(Component { transposed: std::array::from_fn(|d| vectors[d].transpose()), vectors, inverse })
+    }
+}
+
+/// Writes (A₀⊗A₁⊗A₂) u to `out`, by way of `scratch`.
 fn tensor_product<'a>(
     matrices: &[DMatrix<f64>; 3],
     u: &[f64],
@@ -94,7 +105,7 @@ fn tensor_product<'a>(
 ) -> &'a mut [f64] {
     let [n0, n1, n2] = [0, 1, 2].map(|d| matrices[d].ncols());
     let [m0, m1, m2] = [0, 1, 2].map(|d| matrices[d].nrows());
-    // nalgebra is column-major: a C-ordered (x, y, z) array is a matrix with z down and (x, y) across.
+    // nalgebra is column-major: an (x, y, z) array in C order is a matrix with a row for each z and a column for each (x, y).
     out.resize(m2 * n1 * n0, 0.0);
     DMatrixViewMut::from_slice(out, m2, n1 * n0).gemm(
         1.0,
@@ -123,7 +134,7 @@ fn tensor_product<'a>(
     out
 }
 
-/// Stiffness and mass matrix of one axis.
+/// The stiffness and the mass matrix of one axis.
 fn pencil(samples: &[Sample]) -> [DMatrix<f64>; 2] {
     let n = samples.iter().map(|s| s.first + 4).max().unwrap_or(0);
     let mut stiffness = DMatrix::zeros(n, n);
@@ -139,11 +150,8 @@ fn pencil(samples: &[Sample]) -> [DMatrix<f64>; 2] {
     [stiffness, mass]
 }
 
-/// K v = λ M v on the free coefficients: V (n × free) with VᵀMV = 1, and λ.
-fn eigen(
-    [stiffness, mass]: &[DMatrix<f64>; 2],
-    free: &std::ops::Range<usize>,
-) -> Result<(DMatrix<f64>, Vec<f64>)> {
+/// Solves K v = λ M v on the free coefficients: V (n × free) with VᵀMV = 1, and λ.
+fn eigen([stiffness, mass]: &[DMatrix<f64>; 2], free: &Range<usize>) -> Result<(DMatrix<f64>, Vec<f64>)> {
     let block = |m: &DMatrix<f64>| m.view((free.start, free.start), (free.len(), free.len())).into_owned();
     let singular = || Error::Internal("the mass matrix of the warp map is not positive definite".into());
     let lower = block(mass).cholesky().ok_or_else(singular)?.unpack();
@@ -158,12 +166,16 @@ fn eigen(
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::{Axis, Rule};
+    use super::super::axis::{MapAxis, Rule};
     use super::*;
 
     #[test]
-    fn it_inverts_the_stiffness_matrix_written_out() {
-        let axes = [Axis { cells: 4, cell: 0.5 }, Axis { cells: 5, cell: 0.4 }, Axis { cells: 4, cell: 0.3 }];
+    fn it_inverts_the_assembled_stiffness_matrix() {
+        let axes = [
+            MapAxis { cells: 4, cell: 0.5 },
+            MapAxis { cells: 5, cell: 0.4 },
+            MapAxis { cells: 4, cell: 0.3 },
+        ];
         let samples = axes.map(|a| a.quadrature(Rule::Lobatto));
         let [n0, n1, n2] = axes.map(|a| a.len());
         let free = [[1..n0 - 1, 0..n1, 0..n2], [0..n0, 1..n1 - 1, 0..n2], [0..n0, 0..n1, 1..n2]];

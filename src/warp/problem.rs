@@ -1,54 +1,56 @@
-//! The map's optimization problem: minimize ∫ w ρ(J) dV over the maps whose bottom face is the terrain.
+//! Eq. 6, the optimization problem of the map: minimize E_map + E_match, the energy ∫ w ρ(J) dV plus the misfit between the bottom
+//! face and the terrain.
 //!
-//! Unknowns are the coefficients u of φ with face values at the ends of each axis (see `Axis`), component by component.
-//! φ₀ is fixed on the x-faces, φ₁ on the y-faces. The coefficients of φ₂ on the bottom face are not free: they are the L²
-//! projection of h(φ₀, φ₁), and the gradient with respect to them flows on to φ₀ and φ₁ (elimination of Eq. 6's second
-//! term, which makes the match exact up to the projection).
+//! The unknowns u are the coefficients of φ, with face values at the ends of each axis (see `MapAxis`), component by component.
+//! φ₀ is fixed on the x-faces, φ₁ on the y-faces. The coefficients of φ₂ on the bottom face are eliminated: they are the L²
+//! projection of h(φ₀, φ₁), which minimizes E_match over them, and the chain rule takes their gradient to φ₀ and φ₁. What the
+//! projection leaves of E_match is kept with a large weight.
 
-use super::WarpMap;
 use super::assembly::Assembly;
-use super::axis::{Axis, Rule};
+use super::axis::{MapAxis, Rule};
 use super::bottom::Bottom;
 use super::density::Density;
 use super::distance::Norm;
 use super::lanes::Lanes;
-use super::lbfgs::{Objective, dot};
+use super::objective::{Objective, difference, dot};
 use super::preconditioner::Preconditioner;
+use super::spline::WarpMap;
 use crate::Result;
 use crate::heightfield::Heightfield;
 
-/// Weight of the squared misfit that the projection leaves at the bottom, 1/m. Without it the optimizer finds that a steep
-/// place costs least where its points keep away from it (a hill of slope 2 was missed by 139 mm; with it, by 5).
+/// Weight of the squared misfit that the projection leaves at the bottom, 1/m. Without it, the energy is least where the points of
+/// the bottom face avoid steep places (a hill of slope 2 was missed by 139 mm; with it, by 5 mm).
 const MISFIT_WEIGHT: f64 = 1e3;
 
-/// The problem on one grid.
-pub(super) struct Problem<'a, D> {
+/// Eq. 6 on one grid.
+pub(super) struct WarpProblem<'a, D> {
     field: &'a Heightfield,
     density: D,
-    axes: [Axis; 3],
+    axes: [MapAxis; 3],
     assembly: Assembly,
     bottom: Bottom,
     preconditioner: Preconditioner,
     misfit_weight: f64,
-    /// By how much the ground is lower than the terrain for now (bottom-face coefficients, m).
+    /// How far the ground is lowered below the terrain (bottom-face coefficients, m).
     lowered: Vec<f64>,
 }
 
-/// Where an energy is looked at, and what counts there.
+/// Where an energy is evaluated, and its weight above the ground.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quadrature {
     pub rule: Rule,
-    /// Weight of the energy well above the ground, of that at the ground (`MapSpec::torso_weight`).
+    /// Weight of the energy well above the ground relative to that at the ground (`MapSpec::torso_weight`).
     pub torso_weight: f64,
 }
 
-impl<'a, D: Density> Problem<'a, D> {
-    /// On the grid of `map`.
+impl<'a, D: Density> WarpProblem<'a, D> {
+    /// The problem on the grid of `map`.
     ///
     /// # Errors
-    /// Internal ones of the preconditioner.
+    /// Internal errors of the preconditioner.
     pub fn new(field: &'a Heightfield, density: D, map: &WarpMap, points: Quadrature) -> Result<Self> {
-        let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: map.cells()[d], cell: map.cell()[d] });
+        let axes: [MapAxis; 3] =
+            std::array::from_fn(|d| MapAxis { cells: map.cells()[d], cell: map.cell()[d] });
         let weight = |z| density.weight(z, points.torso_weight);
         let assembly = Assembly::new(axes, points.rule, weight, density.face_weight());
         let bottom = Bottom::new(&axes[0], &axes[1]);
@@ -56,7 +58,7 @@ impl<'a, D: Density> Problem<'a, D> {
         let free = [[1..nx - 1, 0..ny, 0..nz], [0..nx, 1..ny - 1, 0..nz], [0..nx, 0..ny, 1..nz]];
         let samples = std::array::from_fn(|d| assembly.samples(d));
         let preconditioner = Preconditioner::new(samples, free, density.stiffness())?;
-        Ok(Problem {
+        Ok(WarpProblem {
             field,
             density,
             axes,
@@ -68,27 +70,23 @@ impl<'a, D: Density> Problem<'a, D> {
         })
     }
 
-    /// The coefficients of a map, on the grid of this problem.
+    /// The coefficients of a map on the grid of this problem.
     pub fn coefficients(&self, map: &WarpMap) -> Vec<f64> {
         coefficients_of(map, &self.axes)
     }
 
     /// How far the ground lies above the bottom face (bottom-face coefficients, m).
     pub fn gap(&self, u: &[f64]) -> Vec<f64> {
-        let mut gap = self.ground(u).face;
-        for (g, v) in gap.iter_mut().zip(self.face(u, 2)) {
-            *g -= v;
-        }
-        gap
+        difference(&self.bottom_fit(u).face, &self.face(u, 2))
     }
 
-    /// From here on, the ground is lower than the terrain by a share of `gap`.
-    pub fn lower_ground(&mut self, gap: &[f64], share: f64) {
-        self.lowered = gap.iter().map(|g| share * g).collect();
+    /// Lowers the ground below the terrain by a fraction of `gap`.
+    pub fn lower_ground(&mut self, gap: &[f64], fraction: f64) {
+        self.lowered = gap.iter().map(|g| fraction * g).collect();
     }
 
-    /// Moves the columns over the bottom face up or down, so that it lies on the ground.
-    pub fn seat(&self, u: &mut [f64]) {
+    /// Moves each column above the bottom face up or down so that the face lies on the ground.
+    pub fn move_onto_ground(&self, u: &mut [f64]) {
         let gap = self.gap(u);
         let columns = u.len() / 3 * 2;
         for (column, gap) in u[columns..].chunks_exact_mut(self.axes[2].len()).zip(gap) {
@@ -96,10 +94,10 @@ impl<'a, D: Density> Problem<'a, D> {
         }
     }
 
-    /// Leaves the misfit out where the grid cannot follow the terrain: where, at these coefficients, it would cost more than
-    /// what bends the map. The terrain is then as smooth as the grid makes it.
-    pub fn forgive_misfit(&mut self, u: &[f64]) {
-        let misfit = self.ground(u).misfit;
+    /// Drops the misfit term if it exceeds the energy of the map at u: then the grid is too coarse for the terrain, and the map
+    /// follows a smoothed one.
+    pub fn drop_dominant_misfit(&mut self, u: &[f64]) {
+        let misfit = self.bottom_fit(u).misfit;
         let misfit_energy = MISFIT_WEIGHT * dot(&self.bottom.weighted(&misfit), &misfit);
         let energy = self.assembly.energy(self.density, u, &mut vec![0.0; u.len()]);
         if misfit_energy > energy {
@@ -121,44 +119,48 @@ impl<'a, D: Density> Problem<'a, D> {
         out
     }
 
-    /// One round of Algorithm 1: the target T(J) at every point and the ground under the bottom are frozen, and the quadratic
-    /// energy ½∫ w‖J − T‖² dV, with the bottom on that ground, is minimized exactly (its matrix is the tensor-product stiffness
-    /// that the preconditioner inverts). Returns the energy before and the square of the step in that energy's norm.
+    /// One round of Algorithm 1. It freezes the target T(J) at every point and the ground under the bottom face, and minimizes the
+    /// quadratic energy ½∫ w‖J − T‖² dV with the face on that ground. Its matrix K is the tensor-product stiffness that the
+    /// preconditioner inverts, so the minimum is exact. Returns the energy before the round and the square of the step in the norm
+    /// of K.
     ///
-    /// With ∇ the gradient at u and K the matrix, the step δ has δ = ground − u on the bottom face and Kδ + ∇ = 0 elsewhere.
-    pub fn alternate(&mut self, u: &mut [f64], scratch: &mut [Vec<f64>; 2]) -> (f64, f64) {
-        let ground = self.ground(u).face;
-        let [rest, moved] = scratch;
-        let energy = self.assembly.energy(self.density, u, rest);
-        moved.fill(0.0);
-        let down: Vec<f64> = ground.iter().zip(self.face(u, 2)).map(|(g, v)| g - v).collect();
-        self.set_face(moved, &down);
-        let mut pull = vec![0.0; u.len()];
-        let seated = 2.0 * self.assembly.energy(Norm, moved, &mut pull);
-        for (r, p) in rest.iter_mut().zip(&pull) {
+    /// With ∇ the gradient at u, the step δ satisfies δ = ground − u on the bottom face and Kδ + ∇ = 0 elsewhere.
+    pub fn alternate(&mut self, u: &mut [f64]) -> (f64, f64) {
+        let mut gradient = vec![0.0; u.len()];
+        let energy = self.assembly.energy(self.density, u, &mut gradient);
+        // δ = face_step − rest, where face_step is zero off the bottom face and rest is zero on it.
+        let mut face_step = vec![0.0; u.len()];
+        self.set_face(&mut face_step, &self.gap(u));
+        let mut product = vec![0.0; u.len()];
+        let face_square = 2.0 * self.assembly.energy(Norm, &face_step, &mut product);
+        // K · rest = ∇ + K · face_step.
+        let mut residual = gradient;
+        for (r, p) in residual.iter_mut().zip(&product) {
             *r += p;
         }
-        self.hold_fixed(rest);
-        pull.copy_from_slice(rest);
-        self.preconditioner.apply(rest);
-        let decrement = dot(&pull, rest);
-        for ((u, m), r) in u.iter_mut().zip(moved.iter()).zip(rest.iter()) {
-            *u += m - r;
+        self.hold_fixed(&mut residual);
+        let mut rest = residual.clone();
+        self.preconditioner.apply(&mut rest);
+        let rest_square = dot(&residual, &rest);
+        for ((u, face), rest) in u.iter_mut().zip(&face_step).zip(&rest) {
+            *u += face - rest;
         }
-        (energy, seated + decrement)
+        (energy, face_square + rest_square)
     }
 
-    /// The Gauss–Newton matrix at u, to be applied by [`Problem::curved`].
+    /// The Gauss–Newton matrix at u, given the curvature of the density; see [`WarpProblem::gauss_newton_product`].
     pub fn linearized<C>(&self, u: &[f64], curvature: impl Fn(&D, &[Lanes; 9]) -> C) -> Linearized<C> {
         Linearized {
             curvatures: self.assembly.curvatures(u, |jacobian| curvature(&self.density, jacobian)),
-            slopes: self.ground(u).slopes,
+            slopes: self.bottom_fit(u).slopes,
         }
     }
 
-    /// `out` ← the Gauss–Newton matrix times a direction, which is zero for what is fixed: the curvature of the energy and the
-    /// square of the misfit's change, with the bottom face moving as φ₀ and φ₁ do.
-    pub fn curved<C>(
+    /// `out` ← the Gauss–Newton matrix times a direction, in which all fixed coefficients are zero: the curvature of the energy plus
+    /// that of the squared misfit, with the bottom face following φ₀ and φ₁.
+    ///
+    /// `times` multiplies the curvature of the density by a change of J.
+    pub fn gauss_newton_product<C>(
         &self,
         at: &Linearized<C>,
         times: impl Fn(&C, &[Lanes; 9]) -> [Lanes; 9],
@@ -170,12 +172,9 @@ impl<'a, D: Density> Problem<'a, D> {
             at.slopes.iter().enumerate().map(|(i, slope)| slope[0] * x[i] + slope[1] * y[i]).collect();
         let face = self.bottom.project(&rise);
         self.set_face(direction, &face);
-        self.assembly.curved(&at.curvatures, times, direction, out);
-        let mut misfit = self.bottom.values(&face);
-        for (m, r) in misfit.iter_mut().zip(&rise) {
-            *m -= r;
-        }
-        self.pass_on(&at.slopes, &self.bottom.weighted(&misfit), out);
+        self.assembly.curvature_product(&at.curvatures, times, direction, out);
+        let misfit = difference(&self.bottom.values(&face), &rise);
+        self.eliminate_face(&at.slopes, &self.bottom.weighted(&misfit), out);
         self.hold_fixed(direction);
     }
 
@@ -193,19 +192,19 @@ impl<'a, D: Density> Problem<'a, D> {
         }
     }
 
-    /// The eliminated coefficients pass their gradient on to φ₀ and φ₁ by the chain rule, with the slopes of h at the Gauss
-    /// points. The misfit (given times quadrature weights) is orthogonal to the splines, so that its square depends on φ₀ and
-    /// φ₁ only through h itself.
-    fn pass_on(&self, slopes: &[[f64; 2]], weighted_misfit: &[f64], gradient: &mut [f64]) {
+    /// Eliminates the bottom-face coefficients of φ₂ from a gradient: adds their part to that of φ₀ and φ₁ by the chain rule, with
+    /// the slopes of h at the Gauss points. Also adds the gradient of the squared misfit. The misfit (given times quadrature
+    /// weights) is orthogonal to the splines, so its square depends on φ₀ and φ₁ through h alone.
+    fn eliminate_face(&self, slopes: &[[f64; 2]], weighted_misfit: &[f64], gradient: &mut [f64]) {
         let n = gradient.len() / 3;
         let nz = self.axes[2].len();
-        let mut pull = self.bottom.project_adjoint(&self.face(gradient, 2));
-        for (p, m) in pull.iter_mut().zip(weighted_misfit) {
+        let mut by_height = self.bottom.project_adjoint(&self.face(gradient, 2));
+        for (p, m) in by_height.iter_mut().zip(weighted_misfit) {
             *p -= 2.0 * self.misfit_weight * m;
         }
         for c in 0..2 {
-            let pulled: Vec<f64> = pull.iter().zip(slopes).map(|(p, slope)| p * slope[c]).collect();
-            let added = self.bottom.values_adjoint(&pulled);
+            let by_place: Vec<f64> = by_height.iter().zip(slopes).map(|(p, slope)| p * slope[c]).collect();
+            let added = self.bottom.values_adjoint(&by_place);
             for (g, a) in gradient[c * n..][..n].iter_mut().step_by(nz).zip(&added) {
                 *g += a;
             }
@@ -213,7 +212,7 @@ impl<'a, D: Density> Problem<'a, D> {
         self.hold_fixed(gradient);
     }
 
-    /// Zero for what is fixed: φ₀ on the x-faces, φ₁ on the y-faces, φ₂ on the bottom.
+    /// Sets the entries of all fixed coefficients to zero: φ₀ on the x-faces, φ₁ on the y-faces, φ₂ on the bottom.
     fn hold_fixed(&self, gradient: &mut [f64]) {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
         let n = nx * ny * nz;
@@ -226,51 +225,49 @@ impl<'a, D: Density> Problem<'a, D> {
         }
     }
 
-    /// What the ground asks for, given φ₀ and φ₁ on the bottom face.
-    fn ground(&self, u: &[f64]) -> Ground {
+    /// The bottom face on the ground, given φ₀ and φ₁ there.
+    fn bottom_fit(&self, u: &[f64]) -> BottomFit {
         let [x, y] = [0, 1].map(|c| self.bottom.values(&self.face(u, c)));
         let (heights, slopes): (Vec<f64>, _) =
             x.iter().zip(&y).map(|(x, y)| self.field.height_and_gradient(*x, *y)).unzip();
         let mut face = self.bottom.project(&heights);
-        let mut misfit = self.bottom.values(&face);
-        for (m, h) in misfit.iter_mut().zip(&heights) {
-            *m -= h;
-        }
+        let misfit = difference(&self.bottom.values(&face), &heights);
         for (f, lowered) in face.iter_mut().zip(&self.lowered) {
             *f -= lowered;
         }
-        Ground { slopes, face, misfit }
+        BottomFit { slopes, face, misfit }
     }
 }
 
-/// What the Gauss–Newton matrix is made of.
+/// The Gauss–Newton matrix as the parts of its products.
 pub(super) struct Linearized<C> {
-    /// Of the density at the points of the assembly.
+    /// Of the density, at the points of the assembly.
     curvatures: Vec<C>,
     /// ∇h at the Gauss points of the bottom.
     slopes: Vec<[f64; 2]>,
 }
 
-/// The bottom face and the terrain under it.
-struct Ground {
+/// The bottom face that fits the ground best.
+struct BottomFit {
     /// ∇h(φ₀, φ₁) at the Gauss points.
     slopes: Vec<[f64; 2]>,
-    /// The bottom-face coefficients that φ₂ must have.
+    /// The bottom-face coefficients of φ₂: the L² projection of h(φ₀, φ₁), lowered.
     face: Vec<f64>,
-    /// What the projection leaves: φ₂ − h(φ₀, φ₁) at the Gauss points, m.
+    /// The error of the projection, φ₂ − h(φ₀, φ₁) at the Gauss points, m.
     misfit: Vec<f64>,
 }
 
-impl<D: Density> Objective for Problem<'_, D> {
+impl<D: Density> Objective for WarpProblem<'_, D> {
+    /// E_map + E_match of Eq. 6, with the bottom face on the ground.
     fn evaluate(&mut self, u: &mut [f64], gradient: &mut [f64]) -> f64 {
-        let Ground { slopes, face, misfit } = self.ground(u);
+        let BottomFit { slopes, face, misfit } = self.bottom_fit(u);
         self.set_face(u, &face);
         let energy = self.assembly.energy(self.density, u, gradient);
         if !energy.is_finite() {
             return energy;
         }
         let weighted = self.bottom.weighted(&misfit);
-        self.pass_on(&slopes, &weighted, gradient);
+        self.eliminate_face(&slopes, &weighted, gradient);
         energy + self.misfit_weight * dot(&weighted, &misfit)
     }
 
@@ -279,8 +276,8 @@ impl<D: Density> Objective for Problem<'_, D> {
     }
 }
 
-/// Control points, component by component, with face values at the ends of each axis.
-pub(super) fn coefficients_of(map: &WarpMap, axes: &[Axis; 3]) -> Vec<f64> {
+/// The control points of a map, component by component, with face values at the ends of each axis.
+pub(super) fn coefficients_of(map: &WarpMap, axes: &[MapAxis; 3]) -> Vec<f64> {
     let mut u = Vec::with_capacity(3 * map.control_points().len());
     for c in 0..3 {
         u.extend(map.control_points().iter().map(|p| p[c]));
@@ -310,7 +307,7 @@ fn along(u: &mut [f64], shape: [usize; 3], axis: usize, change: impl Fn(&mut [f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::barrier::{Barrier, Curvature};
+    use super::super::barrier::{Barrier, BarrierCurvature};
     use super::super::density::Mips;
     use super::super::distance::Distance;
     use super::*;
@@ -328,8 +325,8 @@ mod tests {
         WarpMap::shear(field, &spec).unwrap()
     }
 
-    /// Coefficients a little away from the map's, with what is fixed where it was.
-    fn moved(problem: &Problem<impl Density>, map: &WarpMap) -> Vec<f64> {
+    /// The coefficients of a map, all but the fixed ones perturbed.
+    fn moved(problem: &WarpProblem<impl Density>, map: &WarpMap) -> Vec<f64> {
         let mut u = problem.coefficients(map);
         let mut change: Vec<f64> = (0..u.len()).map(|i| 0.02 * (1.9 * i as f64).sin()).collect();
         problem.hold_fixed(&mut change);
@@ -340,7 +337,7 @@ mod tests {
     fn gradient_matches(density: impl Density) {
         let field = field();
         let map = map(&field);
-        let mut problem = Problem::new(&field, density, &map, POINTS).unwrap();
+        let mut problem = WarpProblem::new(&field, density, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
         let mut gradient = vec![0.0; u.len()];
         let mut unused = gradient.clone();
@@ -369,12 +366,12 @@ mod tests {
     }
 
     #[test]
-    fn the_gauss_newton_matrix_is_symmetric_and_positive() {
+    fn the_gauss_newton_matrix_is_symmetric_and_positive_definite() {
         let field = field();
         let map = map(&field);
-        let problem = Problem::new(&field, Barrier { scale: MapScale::Trace }, &map, POINTS).unwrap();
+        let problem = WarpProblem::new(&field, Barrier { scale: MapScale::Trace }, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
-        problem.seat(&mut u);
+        problem.move_onto_ground(&mut u);
         let linearized = problem.linearized(&u, |density, jacobian| density.curvature(jacobian, 0.0));
         let direction = |k: f64| {
             let mut v: Vec<f64> = (0..u.len()).map(|i| (k * i as f64).sin()).collect();
@@ -383,7 +380,7 @@ mod tests {
         };
         let times = |v: &[f64]| {
             let (mut v, mut out) = (v.to_vec(), vec![0.0; v.len()]);
-            problem.curved(&linearized, Curvature::times, &mut v, &mut out);
+            problem.gauss_newton_product(&linearized, BarrierCurvature::times, &mut v, &mut out);
             out
         };
         let (a, b) = (direction(0.7), direction(1.3));
@@ -396,12 +393,11 @@ mod tests {
     fn a_round_of_algorithm_one_solves_its_quadratic_problem() {
         let field = field();
         let map = map(&field);
-        // The target of this energy is always 1, so that one round is all there is to do above the frozen ground.
-        let mut problem = Problem::new(&field, Distance::Identity, &map, POINTS).unwrap();
+        // The target of this energy is constant, so one round finds the minimum above the frozen ground.
+        let mut problem = WarpProblem::new(&field, Distance::Identity, &map, POINTS).unwrap();
         let mut u = moved(&problem, &map);
-        let ground = problem.ground(&u).face;
-        let mut scratch = [vec![0.0; u.len()], vec![0.0; u.len()]];
-        let (before, _) = problem.alternate(&mut u, &mut scratch);
+        let ground = problem.bottom_fit(&u).face;
+        let (before, _) = problem.alternate(&mut u);
         assert_eq!(problem.face(&u, 2), ground);
         let mut gradient = vec![0.0; u.len()];
         let after = problem.assembly.energy(problem.density, &u, &mut gradient);

@@ -1,9 +1,9 @@
-//! The same map on a finer grid: knots are inserted in the middle of all cells, which changes nothing about φ.
+//! The same map on a finer grid: knots are inserted in the middle of all cells, which leaves φ unchanged.
 
-use super::WarpMap;
+use super::spline::WarpMap;
 
 impl WarpMap {
-    /// φ on a grid with every cell of the chosen axes cut in half.
+    /// φ on a grid with all cells halved along the chosen axes.
     pub(super) fn refined(&self, halve: [bool; 3]) -> WarpMap {
         let mut shape = self.cells().map(|n| n + 3);
         let mut points = self.control_points().to_vec();
@@ -18,7 +18,7 @@ impl WarpMap {
     }
 }
 
-/// Control points over the middle of old cells are means of two, those over old knots are weighted 1 : 6 : 1.
+/// New control points are means of two old ones in the middle of cells, and means of three with weights 1 : 6 : 1 at knots.
 fn refined_along(points: &[[f64; 3]], shape: [usize; 3], axis: usize) -> Vec<[f64; 3]> {
     let stride: usize = shape[axis + 1..].iter().product();
     let fine = 2 * shape[axis] - 3;
@@ -43,12 +43,12 @@ fn refined_along(points: &[[f64; 3]], shape: [usize; 3], axis: usize) -> Vec<[f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::spline::Order;
     use super::*;
     use crate::scenario::MapSpec;
-    use crate::warp::Order;
 
     #[test]
-    fn refinement_changes_nothing_inside() {
+    fn refinement_leaves_the_map_unchanged_inside() {
         let spec = MapSpec { cells: Some([6, 5, 4]), ..MapSpec::default() };
         let mut map = WarpMap::flat([-1.0, 2.0, 0.0, 2.0], &spec).unwrap();
         for (i, p) in map.control_points_mut().iter_mut().enumerate() {

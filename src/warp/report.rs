@@ -1,70 +1,72 @@
-//! What a map is like, measured on grids finer than the one it was made on.
+//! The quality of a map, measured on grids finer than the one it was built on.
+
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
 use super::assembly::Assembly;
-use super::axis::{Axis, Rule};
+use super::axis::{MapAxis, Rule};
 use super::problem::coefficients_of;
-use super::{Order, WarpMap};
+use super::spline::{Order, WarpMap};
 use crate::heightfield::Heightfield;
 use crate::scenario::MapMethod;
 use crate::{Error, Result};
 
-/// How the map was made and what it is like.
+/// How a map was built, and its quality.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapReport {
-    /// Which method made it.
+    /// The method that built it.
     pub method: MapMethod,
-    /// What was tried before it, with `map.method = "auto"`.
+    /// Maps that `map.method = "auto"` built before it and rejected.
     pub rejected: Vec<RejectedMap>,
     /// Cells along x, y, z.
     pub cells: [usize; 3],
-    /// The optimizer met its stopping rule on the finest grid (always, for methods without an optimizer).
+    /// Whether the optimizer converged on the finest grid (true for methods without an optimizer).
     pub converged: bool,
-    /// Iterations, all grids together.
+    /// Iterations on all grids.
     pub iterations: usize,
-    /// Evaluations of the energy, all grids together.
+    /// Evaluations of the energy on all grids.
     pub evaluations: usize,
     /// Wall time, s.
     pub seconds: f64,
-    /// The energy minimized, at the end, m³ (0 for methods that minimize none).
+    /// The energy at the end, m³ (0 for methods without an optimizer).
     pub energy: f64,
-    /// The energy by iteration, one entry for each run of the optimizer, coarse grids first.
+    /// The energy by iteration for each run of the optimizer, coarse grids first.
     pub history: Vec<EnergyHistory>,
-    /// Greatest distance in z of the bottom face from the terrain, m.
+    /// Greatest vertical distance of the bottom face from the terrain, m.
     pub misfit_max: f64,
-    /// Root of the mean square of it, m.
+    /// Root mean square of that distance, m.
     pub misfit_rms: f64,
-    /// Least determinant of J, at three points a cell and axis.
+    /// Least determinant of J at points a third of a cell apart.
     pub min_determinant: f64,
-    /// The point of F where it is, m.
+    /// The point of F with the least determinant, m.
     pub min_determinant_at: [f64; 3],
-    /// How many of these points have a determinant that is not positive: the map is folded there.
+    /// Number of these points whose determinant is not positive: the map is folded there.
     pub inverted_points: usize,
-    /// Conformal error 1 − σ_min/σ_max at the ground, weighted by area of the terrain.
+    /// Conformal error 1 − σ_min/σ_max at the ground, weighted by the area of the terrain.
     pub conformal_ground: Distribution,
     /// The same up to 0.5 m above the ground, weighted by volume.
     pub conformal_near_ground: Distribution,
-    /// The same 0.4 to 0.6 m above the ground, where torsos are.
+    /// The same 0.4 to 0.6 m above the ground, at the height of a torso.
     pub conformal_torso: Distribution,
-    /// Angle between J z and the terrain's normal, degrees, weighted by area (Eq. 9 takes one for the other).
+    /// Angle between J z and the terrain's normal, degrees, weighted by area. (Eq. 9 treats them as equal.)
     pub normal_angle: Distribution,
     /// Least and greatest local scale det^⅓ at the ground.
     pub scale: [f64; 2],
-    /// What a user should know, in words.
+    /// Messages for the user.
     pub warnings: Vec<String>,
 }
 
-/// A map that was not good enough.
+/// A map that `map.method = "auto"` rejected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedMap {
-    /// Which method made it.
+    /// The method that built it.
     pub method: MapMethod,
-    /// In words.
+    /// The reason, in words.
     pub why: String,
 }
 
-/// How the energy fell in one run of the optimizer.
+/// The energy during one run of the optimizer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnergyHistory {
     /// Cells of the grid.
@@ -87,18 +89,18 @@ pub struct Distribution {
 }
 
 impl Distribution {
-    /// Of (value, weight) pairs; zero for none.
+    /// The distribution of (value, weight) pairs; all zero if there are none.
     fn of(mut samples: Vec<[f64; 2]>) -> Distribution {
         samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let total: f64 = samples.iter().map(|s| s[1]).sum();
         let Some(last) = samples.last() else {
             return Distribution::default();
         };
-        let quantile = |share: f64| {
+        let quantile = |fraction: f64| {
             let mut sum = 0.0;
             let reached = |s: &&[f64; 2]| {
                 sum += s[1];
-                sum >= share * total
+                sum >= fraction * total
             };
             samples.iter().find(reached).unwrap_or(last)[0]
         };
@@ -107,22 +109,28 @@ impl Distribution {
     }
 }
 
-/// Points a cell, along each axis of the bottom face.
+/// Points per cell at which the ground is measured, along each axis.
 const GROUND_DENSITY: usize = 3;
-/// Misfit of the bottom face that is worth a warning, m.
+/// Points per cell at which the space above the ground is measured, along each axis.
+const VOLUME_DENSITY: usize = 2;
+/// Heights above the ground that count as near it: up to this, m.
+const NEAR_GROUND: f64 = 0.5;
+/// Heights above the ground of a torso, m.
+const TORSO: RangeInclusive<f64> = 0.4..=0.6;
+/// Misfit of the bottom face that causes a warning, m.
 const MISFIT_WARNING: f64 = 2e-3;
-/// Mean conformal error at the ground that is worth a warning.
+/// Mean conformal error at the ground that causes a warning.
 const CONFORMAL_WARNING: f64 = 0.10;
-/// Mean conformal error at the ground that `map.method = "auto"` accepts.
+/// Greatest mean conformal error at the ground that `map.method = "auto"` accepts.
 const GOOD_CONFORMAL: f64 = 0.05;
-/// Misfit of the bottom face that it accepts, m.
+/// Greatest misfit of the bottom face that `map.method = "auto"` accepts, m.
 const GOOD_MISFIT: f64 = 1e-3;
 
 impl MapReport {
-    /// Measures a map against its terrain. How it was made is for the caller to fill in.
+    /// Measures a map against its terrain. The caller fills in how it was built.
     pub(super) fn measure(map: &WarpMap, field: &Heightfield, method: MapMethod) -> MapReport {
         let (cells, cell, origin) = (map.cells(), map.cell(), map.origin());
-        let axes: [Axis; 3] = std::array::from_fn(|d| Axis { cells: cells[d], cell: cell[d] });
+        let axes: [MapAxis; 3] = std::array::from_fn(|d| MapAxis { cells: cells[d], cell: cell[d] });
         let fine = Assembly::new(axes, Rule::Thirds, |_| 1.0, 1.0);
         let (min_determinant, inverted_points, at) = fine.determinants(&coefficients_of(map, &axes));
         let mut report = MapReport {
@@ -153,8 +161,8 @@ impl MapReport {
         report
     }
 
-    /// Why `map.method = "auto"` would look further; none for a map that is good enough: injective, converged, with a mean
-    /// conformal error at the ground below 5 % and a bottom within 1 mm of the terrain.
+    /// Why `map.method = "auto"` rejects this map; none for a map that is good enough: injective, converged, with a mean conformal
+    /// error of at most [`GOOD_CONFORMAL`] at the ground and a misfit of at most [`GOOD_MISFIT`].
     pub(super) fn shortfall(&self) -> Option<String> {
         let mean = self.conformal_ground.mean;
         if self.inverted_points > 0 {
@@ -172,10 +180,10 @@ impl MapReport {
         }
     }
 
-    /// Refuses a map that no motion can be planned over.
+    /// Rejects a map that is unusable for planning.
     ///
     /// # Errors
-    /// When it is folded: one place of the ground would have several counterparts, and distances a wrong sign.
+    /// If the map is folded. Then several points of F map to one point of A, and heights above the ground have the wrong sign.
     pub fn ensure_injective(&self) -> Result<()> {
         match self.inverted_points {
             0 => Ok(()),
@@ -183,19 +191,20 @@ impl MapReport {
         }
     }
 
-    /// Where it is folded, and what would serve.
+    /// Where the map is folded and what the user can do.
     fn folded(&self) -> String {
         let [x, y, z] = self.min_determinant_at;
-        let serve = match self.method {
+        let remedy = match self.method {
             MapMethod::Dirichlet | MapMethod::Arap | MapMethod::AcapLocalGlobal => {
-                "nothing keeps the energy of this method from folding on steep ground; use map.method = \"mips\" or \"acap-newton\", whose energies forbid it, or smooth the terrain"
+                "the energy of this method does not prevent folding on steep ground; use map.method = \"mips\" or \"acap-newton\", which do, or smooth the terrain"
             }
             _ => "smooth the terrain or use more cells (map.cells)",
         };
         let count = self.inverted_points;
-        format!("it folds at {count} points, worst near x̄ {x:.2}, ȳ {y:.2}, z̄ {z:.2} m; {serve}")
+        format!("it folds at {count} points, worst near x̄ {x:.2}, ȳ {y:.2}, z̄ {z:.2} m; {remedy}")
     }
 
+    /// Misfit, conformal errors, normals and scales at the ground.
     fn measure_ground(&mut self, map: &WarpMap, field: &Heightfield) {
         let [nx, ny, _] = self.cells.map(|n| GROUND_DENSITY * n);
         let (mut errors, mut angles) = (Vec::new(), Vec::new());
@@ -222,24 +231,25 @@ impl MapReport {
         self.normal_angle = Distribution::of(angles);
     }
 
+    /// Conformal errors above the ground.
     fn measure_above(&mut self, map: &WarpMap, field: &Heightfield) {
-        let [nx, ny, nz] = self.cells.map(|n| 2 * n);
+        let [nx, ny, nz] = self.cells.map(|n| VOLUME_DENSITY * n);
         let (mut near, mut torso) = (Vec::new(), Vec::new());
         for i in 0..=nx {
             for j in 0..=ny {
                 for k in 0..=nz {
-                    let at = [i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64];
-                    let local = Local::at(map, at);
+                    let fractions = [i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64];
+                    let local = Local::at(map, fractions);
                     let [x, y, z] = local.position;
                     let clearance = z - field.height(x, y);
-                    if clearance > 0.6 {
+                    if clearance > *TORSO.end() {
                         break;
                     }
                     let sample = [local.conformal_error, local.determinant.abs()];
-                    if clearance <= 0.5 {
+                    if clearance <= NEAR_GROUND {
                         near.push(sample);
                     }
-                    if clearance >= 0.4 {
+                    if clearance >= *TORSO.start() {
                         torso.push(sample);
                     }
                 }
@@ -249,9 +259,10 @@ impl MapReport {
         self.conformal_torso = Distribution::of(torso);
     }
 
+    /// Adds the warnings that the measurements call for.
     fn warn(&mut self) {
         if self.inverted_points > 0 {
-            self.warnings.push(format!("motions over this map would be wrong: {}", self.folded()));
+            self.warnings.push(format!("motions planned over this map would be wrong: {}", self.folded()));
         }
         if self.misfit_max > MISFIT_WARNING {
             self.warnings.push(format!(
@@ -262,7 +273,7 @@ impl MapReport {
         }
         if self.conformal_ground.mean > CONFORMAL_WARNING {
             self.warnings.push(format!(
-                "mean conformal error at the ground is {:.0} %: the conformal friction cone would be off; keep contact.cone = \"exact\"",
+                "the mean conformal error at the ground is {:.0} %: the conformal friction cone would be inaccurate; keep contact.cone = \"exact\"",
                 100.0 * self.conformal_ground.mean
             ));
         }
@@ -274,17 +285,17 @@ struct Local {
     position: [f64; 3],
     jacobian: [[f64; 3]; 3],
     determinant: f64,
-    /// Of the surface z̄ = const.
+    /// The area element of the surface z̄ = const.
     area: f64,
-    /// 1 − σ_min/σ_max, 1 where the map is folded.
+    /// 1 − σ_min/σ_max, or 1 where the map is folded.
     conformal_error: f64,
 }
 
 impl Local {
-    /// At a point given in shares of the box.
-    fn at(map: &WarpMap, share: [f64; 3]) -> Local {
+    /// The map at a point of the box, given as fractions of its size.
+    fn at(map: &WarpMap, fractions: [f64; 3]) -> Local {
         let (origin, size) = (map.origin(), map.size());
-        let jet = map.jet(std::array::from_fn(|d| origin[d] + share[d] * size[d]), Order::First);
+        let jet = map.jet(std::array::from_fn(|d| origin[d] + fractions[d] * size[d]), Order::First);
         let j = nalgebra::Matrix3::from_fn(|r, c| jet.jacobian[r][c]);
         let determinant = j.determinant();
         let squares = (j.transpose() * j).symmetric_eigenvalues();

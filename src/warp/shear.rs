@@ -1,22 +1,22 @@
-//! The simplest map onto the ground: φ(x̄) = (x̄, ȳ, z̄ + h(x̄, ȳ)). Injective for any h, far from conformal on slopes.
+//! The simplest map onto the ground: φ(x̄) = (x̄, ȳ, z̄ + h(x̄, ȳ)). It is injective for any h, but far from conformal on slopes.
 
-use super::WarpMap;
-use super::axis::Axis;
+use super::axis::MapAxis;
 use super::bottom::Bottom;
+use super::spline::WarpMap;
 use crate::Result;
 use crate::heightfield::Heightfield;
 use crate::scenario::MapSpec;
 
 impl WarpMap {
-    /// The shear over the terrain's rectangle; h enters by its L² projection onto the splines of the bottom face.
+    /// The shear over the terrain's rectangle, with the L² projection of h onto the splines of the bottom face.
     ///
     /// # Errors
-    /// When `spec` makes no grid (cells, thickness).
+    /// If the cells or the thickness of `spec` are not valid.
     pub fn shear(field: &Heightfield, spec: &MapSpec) -> Result<WarpMap> {
         let extent = field.extent();
         let mut map = WarpMap::flat(extent, spec)?;
         let ([nx, ny, nz], [width, length, _]) = (map.cells(), map.cell());
-        let (x, y) = (Axis { cells: nx, cell: width }, Axis { cells: ny, cell: length });
+        let (x, y) = (MapAxis { cells: nx, cell: width }, MapAxis { cells: ny, cell: length });
         let bottom = Bottom::new(&x, &y);
         let heights: Vec<f64> = bottom
             .positions()

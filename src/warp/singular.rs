@@ -1,9 +1,9 @@
-//! Singular values and vectors of 3×3 matrices, a few at once.
+//! Singular value decompositions of 3×3 matrices, several at once.
 
 use super::lanes::{LANES, Lanes};
 
-/// J = U diag(σ) Vᵀ with rotations U and V (flat, row by row): σ₀ ≥ σ₁ ≥ |σ₂|, and σ₂ has the sign of det J. Then U Vᵀ is the
-/// rotation nearest to J, whatever that sign (Eq. 12, mended).
+/// J = U diag(σ) Vᵀ with rotations U and V (flat, row by row), σ₀ ≥ σ₁ ≥ |σ₂|, and σ₂ with the sign of det J. Then U Vᵀ is the
+/// rotation nearest to J, whatever that sign: the closed form of Eq. 12 in Corollary IV.1, corrected for det J < 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Singular {
     pub u: [Lanes; 9],
@@ -11,13 +11,13 @@ pub(super) struct Singular {
     pub v: [Lanes; 9],
 }
 
-/// Sweeps of Jacobi's method; on 3×3 matrices the fifth finds nothing left to rotate.
+/// Sweeps of Jacobi's method; on 3×3 matrices it has converged before the fifth.
 const SWEEPS: usize = 5;
 /// Keeps quotients finite for matrices of rank one or zero, whose rotation is undefined anyway.
 const TINY: f64 = 1e-150;
 
 impl Singular {
-    /// Jacobi's method on JᵀJ. Small singular values are exact to √ε of the largest, which is enough for an energy.
+    /// By Jacobi's method on JᵀJ. Small singular values have an error of √ε relative to the largest, which is enough for an energy.
     #[inline]
     pub fn of(j: &[Lanes; 9]) -> Singular {
         let mut v = [0, 0, 0, 0, 0, 0, 0, 0, 0].map(|_: i32| Lanes::ZERO);
@@ -62,7 +62,7 @@ impl Singular {
     }
 }
 
-/// One rotation in the plane of p and q: it makes C_pq zero.
+/// The Jacobi rotation in the plane of p and q that makes C_pq zero.
 #[inline]
 fn rotate(c: &mut [Lanes; 9], v: &mut [Lanes; 9], p: usize, q: usize, r: usize) {
     let off = 2.0 * c[3 * p + q];
@@ -86,7 +86,7 @@ fn rotate(c: &mut [Lanes; 9], v: &mut [Lanes; 9], p: usize, q: usize, r: usize) 
     }
 }
 
-/// Exchanges columns p and q of V where the first belongs to the smaller value; one turns round, so that V stays a rotation.
+/// Swaps columns p and q of V where the former belongs to the smaller value, and negates one so that V stays a rotation.
 #[inline]
 fn sort(squares: &mut [Lanes; 3], v: &mut [Lanes; 9], p: usize, q: usize) {
     for l in 0..LANES {
@@ -104,7 +104,7 @@ fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A vector's direction and length.
+/// The direction and the length of a vector.
 #[inline]
 fn normalized(a: [Lanes; 3]) -> ([Lanes; 3], Lanes) {
     let length = dot(&a, &a).map(f64::sqrt);

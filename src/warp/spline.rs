@@ -1,50 +1,55 @@
-//! φ as a tri-cubic uniform B-spline, and its derivatives.
+//! φ as a tri-cubic uniform B-spline, and its derivatives (Section IV-A):
 //!
-//!   φ(x̄) = Σ_ijk ψ_ijk B_i(s₀) B_j(s₁) B_k(s₂),   s_d = (x̄_d − origin_d) / cell_d   (Section IV-A)
+//!   φ(x̄) = Σ_ijk ψ_ijk B_i(s₀) B_j(s₁) B_k(s₂),   s_d = (x̄_d − origin_d) / cell_d
 
-use super::WarpJet;
+use std::ops::RangeInclusive;
+
 use super::basis::axis_weights;
+use super::jet::{SECOND, THIRD, WarpJet, derivative_index};
 use crate::scenario::MapSpec;
 use crate::{Error, Result};
 
-/// How many derivatives to compute.
+/// The highest derivatives to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Order {
     /// φ and J.
     First,
-    /// And ∂J.
+    /// Those and ∂J.
     Second,
-    /// And ∂²J.
+    /// Those and ∂²J.
     Third,
 }
 
-/// The warp map as stored.
+/// The warp map in its stored form.
 #[derive(Clone, Debug)]
 pub struct MapGrid {
     /// (Nx+3, Ny+3, Nz+3)
     pub shape: [usize; 3],
-    /// (shape, 3) in C order, m.
+    /// ψ, (shape, 3) in C order, m.
     pub control_points: Vec<[f64; 3]>,
     /// Corner of the box in F, m.
     pub origin: [f64; 3],
-    /// Knots by axis, m.
+    /// Knots of each axis, m.
     pub knots: [Vec<f64>; 3],
 }
 
-/// φ: F → A on a box of cells, continued outside (C²) by moving its faces outwards.
+/// φ: F → A on a box of cells, extended beyond the box (C²) by translating its faces outward.
 ///
-/// F is measured in metres as well: the box stands over the terrain's rectangle, its bottom at z̄ = 0 is the ground.
+/// F is measured in meters, too: the box stands on the terrain's rectangle, and its bottom, z̄ = 0, is the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WarpMap {
     cells: [usize; 3],
     origin: [f64; 3],
     cell: [f64; 3],
-    /// ψ, (Nx+3, Ny+3, Nz+3) in C order, so that the four points touched along z are one contiguous run.
+    /// ψ, (Nx+3, Ny+3, Nz+3) in C order, so that the four points needed along z are contiguous.
     control_points: Vec<[f64; 3]>,
 }
 
 impl WarpMap {
-    /// φ(x̄) = x̄ over the rectangle [x_min, x_max, y_min, y_max].
+    /// φ(x̄) = x̄ over the rectangle [x_min, x_max, y_min, y_max], m.
+    ///
+    /// # Errors
+    /// If the rectangle, or the cells or the thickness of `spec`, are not valid.
     pub fn flat(extent: [f64; 4], spec: &MapSpec) -> Result<WarpMap> {
         let (cells, origin, size) = checked_box(extent, spec)?;
         let cell: [f64; 3] = std::array::from_fn(|d| size[d] / cells[d] as f64);
@@ -62,7 +67,7 @@ impl WarpMap {
         Ok(WarpMap { cells, origin, cell, control_points })
     }
 
-    /// A map from its parts; (Nx+3)(Ny+3)(Nz+3) control points.
+    /// A map from its parts, with (Nx+3)(Ny+3)(Nz+3) control points.
     pub(super) fn new(
         cells: [usize; 3],
         origin: [f64; 3],
@@ -73,12 +78,12 @@ impl WarpMap {
         WarpMap { cells, origin, cell, control_points }
     }
 
-    /// Cells along x, y, z.
+    /// Number of cells along x, y, z.
     pub fn cells(&self) -> [usize; 3] {
         self.cells
     }
 
-    /// The corner of the box with the least coordinates, in F, m.
+    /// The corner of the box with the smallest coordinates, in F, m.
     pub fn origin(&self) -> [f64; 3] {
         self.origin
     }
@@ -98,7 +103,7 @@ impl WarpMap {
         &self.control_points
     }
 
-    /// ψ, to be changed in place.
+    /// ψ, to change it in place.
     pub(super) fn control_points_mut(&mut self) -> &mut [[f64; 3]] {
         &mut self.control_points
     }
@@ -117,8 +122,8 @@ impl WarpMap {
         }
     }
 
-    /// All derivatives below the M-th, axis by axis (sum factorization): 16 runs of 4 points are contracted along x, the
-    /// result along y, and that along z.
+    /// All derivatives below the M-th, one axis at a time (sum factorization): 16 runs of 4 points are contracted along x, the
+    /// result along y, and the result of that along z.
     fn derivatives<const M: usize>(&self, x: [f64; 3]) -> WarpJet {
         let [wx, wy, wz] =
             [0, 1, 2].map(|d| axis_weights::<M>((x[d] - self.origin[d]) / self.cell[d], self.cells[d]));
@@ -136,12 +141,7 @@ impl WarpMap {
             }
         }
         let per_cell: [f64; 3] = std::array::from_fn(|d| 1.0 / self.cell[d]);
-        let mut jet = WarpJet {
-            position: [0.0; 3],
-            jacobian: [[0.0; 3]; 3],
-            second: [[0.0; 6]; 3],
-            third: [[0.0; 10]; 3],
-        };
+        let mut jet = WarpJet::ZERO;
         let mut scale_x = 1.0;
         for a in 0..M {
             let mut scale_xy = scale_x;
@@ -155,15 +155,14 @@ impl WarpMap {
                 let mut scale = scale_xy;
                 for c in 0..M - a - b {
                     let w = &wz.weight[c];
-                    // Place among the derivatives of this order, as in `derivative_slot`.
-                    let slot = (b + c) * (b + c + 1) / 2 + c;
+                    let index = derivative_index(b, c);
                     for e in 0..3 {
                         let value = w[0] * run[e] + w[1] * run[3 + e] + w[2] * run[6 + e] + w[3] * run[9 + e];
                         match a + b + c {
                             0 => jet.position[e] = value,
-                            1 => jet.jacobian[e][slot] = scale * value,
-                            2 => jet.second[e][slot] = scale * value,
-                            _ => jet.third[e][slot] = scale * value,
+                            1 => jet.jacobian[e][index] = scale * value,
+                            2 => jet.second[e][index] = scale * value,
+                            _ => jet.third[e][index] = scale * value,
                         }
                     }
                     scale *= per_cell[2];
@@ -178,30 +177,13 @@ impl WarpMap {
                 jet.jacobian[d][d] += shift[1];
             }
             if M > 2 {
-                jet.second[d][[0, 3, 5][d]] += shift[2] * per_cell[d];
+                jet.second[d][SECOND[d][d]] += shift[2] * per_cell[d];
             }
             if M > 3 {
-                jet.third[d][[0, 6, 9][d]] += shift[3] * per_cell[d] * per_cell[d];
+                jet.third[d][THIRD[d][d][d]] += shift[3] * per_cell[d] * per_cell[d];
             }
         }
         jet
-    }
-
-    /// (1 − a) φ + a φ', for continuation from one map to another on the same grid.
-    ///
-    /// # Errors
-    /// When the two maps stand on different grids.
-    pub fn blend(&self, other: &WarpMap, a: f64) -> Result<WarpMap> {
-        if self.cells != other.cells || self.origin != other.origin || self.cell != other.cell {
-            return Err(Error::input(format!(
-                "two warp maps can be blended only on the same grid, but one has {:?} cells from {:?}, the other {:?} from {:?}; build both with the same extent, cells and thickness",
-                self.cells, self.origin, other.cells, other.origin
-            )));
-        }
-        let mix = |p: &[f64; 3], q: &[f64; 3]| std::array::from_fn(|c| (1.0 - a) * p[c] + a * q[c]);
-        let control_points =
-            self.control_points.iter().zip(&other.control_points).map(|(p, q)| mix(p, q)).collect();
-        Ok(WarpMap { control_points, ..self.clone() })
     }
 
     /// The map as stored in a plan: ψ with the N + 7 knots of each axis.
@@ -219,85 +201,88 @@ impl WarpMap {
     /// The map from its stored form.
     ///
     /// # Errors
-    /// When shape, knots and control points do not fit together, the knots are not uniform, or a value is not finite.
+    /// If shape, knots and control points are inconsistent, the knots are not uniform, or a value is not finite.
     pub fn from_grid(grid: &MapGrid) -> Result<WarpMap> {
-        let wrong = |what: String| Err(Error::input(format!("warp map: {what}; write the plan again")));
-        let mut cell = [0.0; 3];
-        for d in 0..3 {
-            let knots = &grid.knots[d];
-            let axis = ["x", "y", "z"][d];
-            if grid.shape[d] < 4 {
-                return wrong(format!(
-                    "{} control points along {axis}, at least 4 are needed",
-                    grid.shape[d]
-                ));
-            }
-            if knots.len() != grid.shape[d] + 4 {
-                return wrong(format!(
-                    "{} knots along {axis} for {} control points, expected 4 more than these",
-                    knots.len(),
-                    grid.shape[d]
-                ));
-            }
-            let cells = grid.shape[d] - 3;
-            cell[d] = (knots[3 + cells] - knots[3]) / cells as f64;
-            if !(cell[d] > 0.0 && cell[d].is_finite()) {
-                return wrong(format!("the knots along {axis} do not increase"));
-            }
-            let expected = |i: usize| grid.origin[d] + (i as f64 - 3.0) * cell[d];
-            if let Some(i) = (0..knots.len()).find(|&i| {
-                let off = (knots[i] - expected(i)).abs();
-                off > 1e-6 * cell[d] || off.is_nan()
-            }) {
-                return wrong(format!(
-                    "knot {i} along {axis} is {} m where uniform knots from the origin have {} m",
-                    knots[i],
-                    expected(i)
-                ));
-            }
-        }
+        let cell = [grid.cell_size(0)?, grid.cell_size(1)?, grid.cell_size(2)?];
         let points: usize = grid.shape.iter().product();
         if grid.control_points.len() != points {
-            return wrong(format!(
-                "{} control points, the shape {:?} asks for {points}",
+            return Err(invalid(format!(
+                "{} control points where the shape {:?} requires {points}",
                 grid.control_points.len(),
                 grid.shape
-            ));
+            )));
         }
         if let Some(i) = grid.control_points.iter().position(|p| p.iter().any(|v| !v.is_finite())) {
-            return wrong(format!("control point {i} is not finite"));
+            return Err(invalid(format!("control point {i} is not finite")));
         }
-        Ok(WarpMap {
-            cells: grid.shape.map(|n| n - 3),
-            origin: grid.origin,
-            cell,
-            control_points: grid.control_points.clone(),
-        })
+        Ok(WarpMap::new(grid.shape.map(|n| n - 3), grid.origin, cell, grid.control_points.clone()))
     }
 }
 
-/// About a gigabyte in the optimizer.
-const MAX_CELLS: usize = 1_000_000;
+/// Greatest deviation of a stored knot from a uniform grid, in cells.
+const KNOT_TOLERANCE: f64 = 1e-6;
 
-/// Cells, origin and size of the box over a rectangle.
+impl MapGrid {
+    /// Size of the cells along axis d, m; checks the axis.
+    fn cell_size(&self, d: usize) -> Result<f64> {
+        let (knots, points) = (&self.knots[d], self.shape[d]);
+        let axis = ["x", "y", "z"][d];
+        if points < 4 {
+            return Err(invalid(format!("{points} control points along {axis}, but at least 4 are needed")));
+        }
+        if knots.len() != points + 4 {
+            return Err(invalid(format!(
+                "{} knots along {axis} for {points} control points; there must be 4 more knots than points",
+                knots.len()
+            )));
+        }
+        let cells = points - 3;
+        let size = (knots[3 + cells] - knots[3]) / cells as f64;
+        if !(size > 0.0 && size.is_finite()) {
+            return Err(invalid(format!("the knots along {axis} do not increase")));
+        }
+        for (i, knot) in knots.iter().enumerate() {
+            let uniform = self.origin[d] + (i as f64 - 3.0) * size;
+            let deviation = (knot - uniform).abs();
+            if deviation > KNOT_TOLERANCE * size || deviation.is_nan() {
+                return Err(invalid(format!(
+                    "knot {i} along {axis} is at {knot} m where uniform knots from the origin have one at {uniform} m"
+                )));
+            }
+        }
+        Ok(size)
+    }
+}
+
+/// The error for a stored map that cannot be used.
+fn invalid(what: String) -> Error {
+    Error::input(format!("warp map: {what}; write the plan again"))
+}
+
+/// These take about a gigabyte in the optimizer.
+const MAX_CELLS: usize = 1_000_000;
+/// Cells along one axis.
+const CELLS: RangeInclusive<usize> = 4..=512;
+
+/// Cells, origin and size of the box over a rectangle, checked.
 fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
     let [x_min, x_max, y_min, y_max] = extent;
     let size = [x_max - x_min, y_max - y_min, spec.thickness];
     if !size.iter().all(|s| s.is_finite() && *s > 0.0) {
         return Err(Error::input(format!(
-            "the warp map needs a box of positive size, not {} × {} × {} m (terrain extent, map.thickness)",
+            "the box of the warp map must have a positive size, not {} × {} × {} m (terrain extent, map.thickness)",
             size[0], size[1], size[2]
         )));
     }
     let grid = spec.cells(extent);
-    if let Some(n) = grid.iter().find(|n| !(4..=512).contains(*n)) {
-        return Err(Error::input(format!("map.cells = {:?}: {n} is not between 4 and 512", grid)));
+    if let Some(n) = grid.iter().find(|n| !CELLS.contains(n)) {
+        let (least, most) = (CELLS.start(), CELLS.end());
+        return Err(Error::input(format!("map.cells = {grid:?}: {n} is not between {least} and {most}")));
     }
     let cells: usize = grid.iter().product();
     if cells > MAX_CELLS {
         return Err(Error::input(format!(
-            "map.cells = {:?} makes {cells} cells; more than {MAX_CELLS} would need gigabytes of memory",
-            grid
+            "map.cells = {grid:?} makes {cells} cells; more than {MAX_CELLS} would need gigabytes of memory"
         )));
     }
     Ok((grid, [x_min, y_min, 0.0], size))
