@@ -1,5 +1,7 @@
 //! The uniform cubic B-spline along one axis: weights, their extension beyond the ends, and interpolation.
 
+use crate::bspline::uniform_cubic;
+
 /// Beyond an end the second derivative fades out over this length, m.
 pub const CURVATURE_FADE: f64 = 0.2;
 /// Beyond an end the slope fades out over this length, m; farther out, h is constant along the axis.
@@ -49,22 +51,11 @@ impl Axis {
     /// Weights at the local coordinate s ∈ [0, 1] of a cell.
     #[inline]
     fn inside<const ORDERS: usize>(&self, s: f64) -> [[f64; 4]; ORDERS] {
-        let r = 1.0 - s;
+        let basis = uniform_cubic(s);
         let mut weights = [[0.0; 4]; ORDERS];
         let mut scale = 1.0;
-        for (order, row) in weights.iter_mut().enumerate() {
-            let basis = match order {
-                0 => [
-                    r * r * r / 6.0,
-                    2.0 / 3.0 - s * s * (1.0 - 0.5 * s),
-                    2.0 / 3.0 - r * r * (1.0 - 0.5 * r),
-                    s * s * s / 6.0,
-                ],
-                1 => [-0.5 * r * r, s * (1.5 * s - 2.0), -r * (1.5 * r - 2.0), 0.5 * s * s],
-                2 => [r, 3.0 * s - 2.0, 3.0 * r - 2.0, s],
-                _ => [-1.0, 3.0, -3.0, 1.0],
-            };
-            *row = basis.map(|b| b * scale);
+        for (row, values) in weights.iter_mut().zip(basis) {
+            *row = values.map(|b| b * scale);
             scale *= self.rate;
         }
         weights

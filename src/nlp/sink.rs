@@ -123,13 +123,13 @@ enum Mode<'a> {
     Fill { slots: &'a [u32], values: &'a mut [f64] },
 }
 
+/// The slots of some entries, and all values.
+type NextSlots<'a> = (std::slice::Iter<'a, u32>, &'a mut [f64]);
+
 impl Mode<'_> {
-    /// The slots of the next `count` entries, and all values; none while places are recorded.
+    /// The slots of the next `count` entries, and all values; while places are recorded, these.
     #[inline]
-    fn next(
-        &mut self,
-        count: usize,
-    ) -> Result<(std::slice::Iter<'_, u32>, &mut [f64]), &mut Vec<(u32, u32)>> {
+    fn next(&mut self, count: usize) -> Result<NextSlots<'_>, &mut Vec<(u32, u32)>> {
         match self {
             Self::Record(places) => Err(places),
             Self::Fill { slots, values } => {
