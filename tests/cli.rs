@@ -125,7 +125,7 @@ fn check_refuses_bad_input() {
     std::fs::write(at("limits.toml"), "newton = 3\n").unwrap();
 
     refused(folder.path(), &["check", "none.plan.npz"], &["none.plan.npz"]);
-    refused(folder.path(), &["check", "half.plan.npz"], &["half.plan.npz", "cut short"]);
+    refused(folder.path(), &["check", "half.plan.npz"], &["half.plan.npz", "truncated"]);
     refused(folder.path(), &["check", "newer.plan.npz"], &["newer.plan.npz", "`meta`", "schema 2 is newer"]);
     refused(folder.path(), &["check", "odd.plan.npz"], &["meta.scenario:1: horizon: given nan"]);
     refused(folder.path(), &["check", "limits.toml"], &["limits.toml", "not an .npz archive"]);
