@@ -9,10 +9,10 @@ use super::model::Model;
 use super::problem::{Choice, Problem};
 use super::violation::{self, BlockViolation};
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, IterationRecord, NlpProblem, Options, Status};
+use crate::ipopt::{self, IterationRecord, LinearSolver, NlpProblem, Options, Status};
 use crate::plan::Seconds;
 use crate::robot::Robot;
-use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Law, Scenario};
+use crate::scenario::{self, Continuation, ContinuationMode, Effort, Formulation, Hessian, Law, Scenario};
 use crate::trajectory::space::Space;
 use crate::warp::{self, WarpMap};
 use crate::{Error, Result};
@@ -63,6 +63,8 @@ pub struct Motion {
     pub violations: Vec<BlockViolation>,
     /// Every iteration of every stage; seconds count from the start of the solve.
     pub history: Vec<IterationRecord>,
+    /// The linear solver that Ipopt worked with, in the last stage.
+    pub linear_solver: LinearSolver,
     /// Where the time went; without the map's.
     pub seconds: Seconds,
 }
@@ -81,7 +83,15 @@ pub fn validate(scenario: &Scenario) -> Result<()> {
             "physics.law = \"newton-euler\" needs the orientation's second derivative in time, and the map is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default), or formulation = \"direct\"",
         ));
     }
-    Ok(())
+    Ok(linear_solver(scenario).check()?)
+}
+
+fn linear_solver(scenario: &Scenario) -> LinearSolver {
+    match scenario.solver.linear_solver {
+        scenario::LinearSolver::Auto => LinearSolver::Auto,
+        scenario::LinearSolver::Faer => LinearSolver::Faer,
+        scenario::LinearSolver::Mumps => LinearSolver::Mumps,
+    }
 }
 
 /// Composes the NLP of a scenario at its guess, for checks of its derivatives.
@@ -158,6 +168,7 @@ struct Run<'a, 'b> {
     start: Instant,
     history: Vec<IterationRecord>,
     iterations: usize,
+    linear_solver: LinearSolver,
     seconds: Seconds,
 }
 
@@ -169,6 +180,7 @@ impl<'a, 'b> Run<'a, 'b> {
             start: Instant::now(),
             history: Vec::new(),
             iterations: 0,
+            linear_solver: linear_solver(scenario),
             seconds: Seconds::default(),
         }
     }
@@ -218,7 +230,8 @@ impl<'a, 'b> Run<'a, 'b> {
         let mut problem = Problem::new(self.scenario, model, x, choice);
         let centred = (start, hessian, self.scenario.formulation)
             == (Start::Guess, Hessian::Exact, Formulation::Warped);
-        let options = options(hessian, centred, solver.hessian_memory, tolerance, budget);
+        let options = options(hessian, centred, solver.hessian_memory, tolerance, budget)
+            .linear_solver(linear_solver(self.scenario));
 
         let (history, on_progress) = (&mut self.history, &mut *self.on_progress);
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
@@ -256,6 +269,7 @@ impl<'a, 'b> Run<'a, 'b> {
             if good_enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .map_err(|error| Error::Internal(error.to_string()))?;
+        self.linear_solver = solution.linear_solver;
         self.iterations += solution.history.last().map_or(0, |r| r.iteration);
         self.seconds.evaluation += solution.evaluation_seconds;
         self.seconds.linear_solver += solution.total_seconds - solution.evaluation_seconds;
@@ -340,6 +354,7 @@ impl<'a, 'b> Run<'a, 'b> {
             iterations: self.iterations,
             violations,
             history: self.history,
+            linear_solver: self.linear_solver,
             seconds: self.seconds,
         })
     }

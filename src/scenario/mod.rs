@@ -515,6 +515,18 @@ pub enum ContinuationMode {
     Off,
 }
 
+/// `solver.linear_solver`: what solves the systems of equations inside Ipopt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LinearSolver {
+    /// Faer where the Ipopt that is installed can take it, else MUMPS.
+    Auto,
+    /// Condensed and factored in Rust.
+    Faer,
+    /// Ipopt's own.
+    Mumps,
+}
+
 /// `[solver]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -532,6 +544,8 @@ pub struct SolverSpec {
     /// How many steps the limited-memory Hessian remembers.
     #[schemars(range(min = 1, max = 1000))]
     pub hessian_memory: usize,
+    /// What solves the systems of equations inside Ipopt.
+    pub linear_solver: LinearSolver,
     /// How far to go.
     pub effort: Effort,
     /// Threads that evaluate the derivatives of the NLP; the linear solver keeps to one.
@@ -547,6 +561,7 @@ impl Default for SolverSpec {
             continuation: Continuation::Mode(ContinuationMode::Auto),
             hessian: None,
             hessian_memory: 6,
+            linear_solver: LinearSolver::Auto,
             effort: Effort::Smooth,
             threads: 1,
         }
