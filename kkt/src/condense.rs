@@ -62,9 +62,26 @@ pub struct Condenser {
     coefficients: Vec<f64>,
     pivots: Vec<Pivot>,
     weights: Vec<f64>,
+    /// A column of a group's sum.
+    sums: Vec<f64>,
 }
 
 const NONE: u32 = u32::MAX;
+
+/// [`Condenser::add_products`] as pulp calls it.
+struct AddProducts<'a> {
+    condenser: &'a mut Condenser,
+    reduced: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for AddProducts<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.condenser.add_products(self.reduced);
+    }
+}
 
 /// The inequalities of a matrix, as its pattern tells them; `None` if it is not what [`Layout`] describes, so that nothing can be condensed.
 struct Inequalities {
@@ -162,6 +179,7 @@ impl Condenser {
             coefficient_sources.extend(rows[k as usize].iter().map(|&(_, place)| place));
         }
 
+        let widest = groups.iter().map(|group| group.width).max().unwrap_or(0);
         let mut condenser = Self {
             layout,
             kept,
@@ -175,6 +193,7 @@ impl Condenser {
             coefficient_sources,
             pivots: vec![Pivot::default(); m],
             weights: vec![0.0; m],
+            sums: vec![0.0; widest],
         };
         let pattern = condenser.fill(matrix, &reduced_of, reduced);
         (condenser, pattern)
@@ -278,19 +297,33 @@ impl Condenser {
             };
             *weight = -sigma / determinant;
         }
-        let mut sums = Vec::new();
+        // With the widest vectors that the processor has.
+        pulp::Arch::new().dispatch(AddProducts { condenser: self, reduced });
+        Some(negative)
+    }
+
+    /// Adds Σ weight · j jᵀ over all inequalities, group by group: a group's sum is dense.
+    #[inline(always)]
+    fn add_products(&mut self, reduced: &mut [f64]) {
         for group in &self.groups {
             let (width, weights) = (group.width, &self.weights[group.first..][..group.count]);
             let rows = &self.coefficients[group.coefficients..][..group.count * width];
             let mut places = &self.places[group.places..];
-            sums.resize(sums.len().max(width), 0.0);
             for t in 0..width {
-                let sums = &mut sums[t..width];
+                let sums = &mut self.sums[..width - t];
                 sums.fill(0.0);
-                for (row, weight) in rows.chunks_exact(width).zip(weights) {
+                let (pairs, pair_weights) = (rows.chunks_exact(2 * width), weights.chunks_exact(2));
+                if let ([weight], row) = (pair_weights.remainder(), pairs.remainder()) {
                     let factor = weight * row[t];
                     for (sum, coefficient) in sums.iter_mut().zip(&row[t..]) {
-                        *sum += factor * coefficient;
+                        *sum = factor * coefficient;
+                    }
+                }
+                for (rows, weights) in pairs.zip(pair_weights) {
+                    let (first, second) = rows.split_at(width);
+                    let factors = [weights[0] * first[t], weights[1] * second[t]];
+                    for ((sum, a), b) in sums.iter_mut().zip(&first[t..]).zip(&second[t..]) {
+                        *sum += factors[0] * a + factors[1] * b;
                     }
                 }
                 let (these, rest) = places.split_at(width - t);
@@ -300,7 +333,6 @@ impl Condenser {
                 }
             }
         }
-        Some(negative)
     }
 
     /// The right-hand side of the reduced system.

@@ -11,13 +11,13 @@ use crate::symmetric::Symmetric;
 const STATIC_REGULARIZATION: f64 = 1e-8;
 /// See [`STATIC_REGULARIZATION`].
 const PERTURBED: f64 = 1e-12;
-/// The certificate: a random vector of normally distributed numbers has shrunk to this length. The component of an eigenvector that does not
-/// shrink is below it with a probability of less than 1e-6.
-const CERTAIN: f64 = 1e-6;
+/// The certificate: a random vector of normally distributed numbers has shrunk to this length. Its component along an eigenvector that does not
+/// shrink is shorter than that from the beginning with a probability of less than 1e-3.
+const CERTAIN: f64 = 1e-3;
 /// How often the random vector may be multiplied.
 const MOST_PROBES: usize = 8;
 /// Refinement ends when the residual is this small against the solution and the right-hand side, max norm …
-const WANTED_RESIDUAL: f64 = 1e-13;
+const WANTED_RESIDUAL: f64 = 1e-12;
 /// … or when it has become smaller by less than this factor …
 const LEAST_IMPROVEMENT: f64 = 0.5;
 /// … or after so many steps.
@@ -108,7 +108,8 @@ pub struct Kkt {
     reduced: Vec<f64>,
     solution: Vec<f64>,
     residual: Vec<f64>,
-    correction: Vec<f64>,
+    best: Vec<f64>,
+    zero: Vec<f64>,
     /// What was done so far.
     pub statistics: Statistics,
 }
@@ -145,7 +146,8 @@ impl Kkt {
             reduced: vec![0.0; reduced],
             solution: vec![0.0; n],
             residual: vec![0.0; n],
-            correction: vec![0.0; n],
+            best: vec![0.0; n],
+            zero: vec![0.0; n],
             statistics: Statistics { analysis_time: start.elapsed(), ..Statistics::default() },
         })
     }
@@ -201,37 +203,30 @@ impl Kkt {
 
     /// Multiplies a random vector v by I − M⁻¹K until it is short, and says whether that came about.
     fn refinement_converges(&mut self) -> bool {
-        let zero = &mut self.solution;
-        zero.fill(0.0);
-        self.correction.copy_from_slice(&self.random);
-        let mut error = std::mem::take(&mut self.correction);
-        let mut product = std::mem::take(&mut self.residual);
-        let mut certain = false;
+        self.solution.copy_from_slice(&self.random);
         for _ in 0..MOST_PROBES {
             self.statistics.probes += 1;
-            // −Kv, and v + M⁻¹(−Kv).
-            self.matrix.residual(&self.solution, &error, &mut product);
-            self.solve_once(&mut product);
-            for (error, product) in error.iter_mut().zip(&product) {
-                *error += product;
+            self.matrix.residual(&self.zero, &self.solution, &mut self.residual);
+            self.correct();
+            let length = norm(&self.solution);
+            if length <= CERTAIN {
+                return true;
             }
-            let length = norm(&error);
-            if std::env::var_os("KKT_LOG").is_some() { eprintln!("probe {length:.2e}"); }
-            certain = length <= CERTAIN;
-            if certain || !length.is_finite() {
-                break;
+            if !length.is_finite() {
+                return false;
             }
         }
-        self.correction = error;
-        self.residual = product;
-        certain
+        false
     }
 
-    /// M⁻¹ times a vector.
-    fn solve_once(&mut self, x: &mut [f64]) {
-        self.condenser.restrict(x, &mut self.reduced);
+    /// solution ← solution + M⁻¹ residual; the residual is used up.
+    fn correct(&mut self) {
+        self.condenser.restrict(&self.residual, &mut self.reduced);
         self.ldlt.solve(&mut self.reduced);
-        self.condenser.expand(&self.reduced, x);
+        self.condenser.expand(&self.reduced, &mut self.residual);
+        for (value, correction) in self.solution.iter_mut().zip(&self.residual) {
+            *value += correction;
+        }
     }
 
     /// Solves with the matrix that was factored last: `x` is the right-hand side, then the solution. Returns the residual's max norm over those of
@@ -241,50 +236,39 @@ impl Kkt {
     /// When `x` does not have the matrix's order.
     pub fn solve(&mut self, x: &mut [f64]) -> f64 {
         let start = Instant::now();
-        let mut solution = std::mem::take(&mut self.solution);
-        let mut residual = std::mem::take(&mut self.residual);
-        let mut correction = std::mem::take(&mut self.correction);
-        solution.copy_from_slice(x);
-        self.solve_once(&mut solution);
-        let right_side = max_norm(x);
-        self.matrix.residual(x, &solution, &mut residual);
-        let relative = |residual: &[f64], solution: &[f64]| {
-            let size = max_norm(solution) + right_side;
-            if size > 0.0 { max_norm(residual) / size } else { 0.0 }
-        };
-        let mut error = relative(&residual, &solution);
+        let right_side_norm = max_norm(x);
+        self.solution.fill(0.0);
+        self.residual.copy_from_slice(x);
+        self.correct();
+        let mut error = self.error(x, right_side_norm);
+        self.best.copy_from_slice(&self.solution);
         for _ in 0..MOST_STEPS {
-            if std::env::var_os("KKT_LOG").is_some() { eprintln!("error {error:.2e}"); }
-            // Also ends when the error is no number.
-            if !(error > WANTED_RESIDUAL) {
+            if error <= WANTED_RESIDUAL || error.is_nan() {
                 break;
             }
             self.statistics.refinements += 1;
-            correction.copy_from_slice(&residual);
-            self.solve_once(&mut correction);
-            for (correction, solution) in correction.iter_mut().zip(&solution) {
-                *correction += solution;
+            self.correct();
+            let last = std::mem::replace(&mut error, self.error(x, right_side_norm));
+            if error < last {
+                self.best.copy_from_slice(&self.solution);
             }
-            self.matrix.residual(x, &correction, &mut residual);
-            let next = relative(&residual, &correction);
-            let improved = next < error;
-            if improved {
-                std::mem::swap(&mut solution, &mut correction);
-            }
-            let go_on = next < LEAST_IMPROVEMENT * error;
-            error = error.min(next);
-            if !go_on {
+            if error.is_nan() || error > LEAST_IMPROVEMENT * last {
+                error = error.min(last);
                 break;
             }
         }
-        x.copy_from_slice(&solution);
-        self.solution = solution;
-        self.residual = residual;
-        self.correction = correction;
+        x.copy_from_slice(&self.best);
         self.statistics.solves += 1;
         self.statistics.worst_residual = self.statistics.worst_residual.max(error);
         self.statistics.solve_time += start.elapsed();
         error
+    }
+
+    /// Computes the residual of the solution, and its max norm over those of solution plus right-hand side.
+    fn error(&mut self, right_side: &[f64], right_side_norm: f64) -> f64 {
+        self.matrix.residual(right_side, &self.solution, &mut self.residual);
+        let size = max_norm(&self.solution) + right_side_norm;
+        if size == 0.0 { 0.0 } else { max_norm(&self.residual) / size }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::condense::Pattern;
 use crate::kkt::Error;
 
 /// A pivot smaller than this is replaced by one of [`LEAST_PIVOT`] with its sign. Entries of the matrix are of order one.
-const TINY_PIVOT: f64 = 1e-10;
+const TINY_PIVOT: f64 = 1e-12;
 /// See [`TINY_PIVOT`].
 const LEAST_PIVOT: f64 = 1e-8;
 
