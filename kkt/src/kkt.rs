@@ -7,15 +7,15 @@ use crate::condense::Condenser;
 use crate::ldlt::Ldlt;
 use crate::symmetric::Symmetric;
 
-/// A multiplier's diagonal is lowered to −1e-8 unless it is already below −1e-12, as it is where Ipopt has perturbed it.
-const STATIC_REGULARIZATION: f64 = 1e-8;
-/// See [`STATIC_REGULARIZATION`].
+/// A multiplier's diagonal is lowered by this much unless it is already below −1e-12, as it is where Ipopt has perturbed it. With less of it, equations that are
+/// closer to dependent have a certain inertia, but rounding errors grow: the second one is for where the first does not do. Each
+/// with how often the random vector of the certificate may be multiplied.
+const STATIC_REGULARIZATIONS: [(f64, usize); 2] = [(1e-8, 3), (1e-11, 6)];
+/// See [`STATIC_REGULARIZATIONS`].
 const PERTURBED: f64 = 1e-12;
 /// The certificate: a random vector of normally distributed numbers has shrunk to this length. Its component along an eigenvector that does not
 /// shrink is shorter than that from the beginning with a probability of less than 1e-3.
 const CERTAIN: f64 = 1e-3;
-/// How often the random vector may be multiplied.
-const MOST_PROBES: usize = 8;
 /// Refinement ends when the residual is this small against the solution and the right-hand side, max norm …
 const WANTED_RESIDUAL: f64 = 1e-12;
 /// … or when it has become smaller by less than this factor …
@@ -190,21 +190,23 @@ impl Kkt {
 
     fn try_factor(&mut self, values: &[f64]) -> Option<usize> {
         self.matrix.assemble(values);
-        let condensed = self.condenser.reduce(&self.matrix.values, &mut self.ldlt.values)?;
-        for &place in &self.multipliers {
-            let diagonal = &mut self.ldlt.values[place as usize];
-            if *diagonal > -PERTURBED {
-                *diagonal -= STATIC_REGULARIZATION;
+        STATIC_REGULARIZATIONS.iter().find_map(|&(regularization, most_probes)| {
+            let condensed = self.condenser.reduce(&self.matrix.values, &mut self.ldlt.values)?;
+            for &place in &self.multipliers {
+                let diagonal = &mut self.ldlt.values[place as usize];
+                if *diagonal > -PERTURBED {
+                    *diagonal -= regularization;
+                }
             }
-        }
-        let negative = condensed + self.ldlt.factor()?;
-        self.refinement_converges().then_some(negative)
+            let negative = condensed + self.ldlt.factor()?;
+            self.refinement_converges(most_probes).then_some(negative)
+        })
     }
 
-    /// Multiplies a random vector v by I − M⁻¹K until it is short, and says whether that came about.
-    fn refinement_converges(&mut self) -> bool {
+    /// Multiplies a random vector by I − M⁻¹K until it is short, and says whether that came about.
+    fn refinement_converges(&mut self, most_probes: usize) -> bool {
         self.solution.copy_from_slice(&self.random);
-        for _ in 0..MOST_PROBES {
+        for _ in 0..most_probes {
             self.statistics.probes += 1;
             self.matrix.residual(&self.zero, &self.solution, &mut self.residual);
             self.correct();

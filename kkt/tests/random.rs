@@ -105,8 +105,13 @@ fn inertia_and_solutions_are_right() {
                 matrix.check_solve(&mut kkt, &mut random);
             }
         }
-        println!("kind {number}: {regular} of 60 regular, {well} well-conditioned, of which {missed} called singular");
-        assert!(20 * missed <= well, "kind {number}: {missed} of {well} well-conditioned ones called singular");
+        println!(
+            "kind {number}: {regular} of 60 regular, {well} well-conditioned, of which {missed} called singular"
+        );
+        assert!(
+            20 * missed <= well,
+            "kind {number}: {missed} of {well} well-conditioned ones called singular"
+        );
     }
 }
 

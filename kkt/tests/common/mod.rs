@@ -76,9 +76,16 @@ impl Matrix {
         dense
     }
 
-    /// In ascending order.
-    pub fn eigenvalues(&self) -> Vec<f64> {
-        let dense = self.dense();
+    /// Those of the matrix after a scaling of rows and columns, which leaves their signs (Sylvester) and makes them as exact as can be.
+    pub fn scaled_eigenvalues(&self) -> Vec<f64> {
+        let mut dense = self.dense();
+        let n = self.dimension();
+        for _ in 0..3 {
+            let largest = |i: usize| (0..n).map(|j| dense[(i, j)].abs()).fold(0.0, f64::max);
+            let scale = |size: f64| if size > 0.0 { 1.0 / size.sqrt() } else { 1.0 };
+            let factors: Vec<f64> = (0..n).map(|i| scale(largest(i))).collect();
+            dense = Mat::from_fn(n, n, |i, j| dense[(i, j)] * factors[i] * factors[j]);
+        }
         dense.self_adjoint_eigenvalues(faer::Side::Lower).expect("the iteration converges")
     }
 
@@ -118,7 +125,7 @@ impl Matrix {
     /// eigenvalue over the largest, by magnitude, and the number of negative ones if the matrix is called regular.
     #[track_caller]
     pub fn check_inertia(&self, kkt: &mut Kkt) -> (f64, Option<usize>) {
-        let eigenvalues = self.eigenvalues();
+        let eigenvalues = self.scaled_eigenvalues();
         let size = |pick: fn(f64, f64) -> f64, start| eigenvalues.iter().map(|v| v.abs()).fold(start, pick);
         let (least, most) = (size(f64::min, f64::INFINITY), size(f64::max, 0.0));
         let ratio = if most > 0.0 { least / most } else { 0.0 };
