@@ -25,6 +25,8 @@ macro_rules! bindings {
 
 bindings!("bindings.rs");
 
+pub mod ma57;
+
 /// The dialects of the header, whichever is installed: the same code compiles against both.
 #[cfg(test)]
 #[allow(dead_code, clashing_extern_declarations)]

@@ -15,6 +15,7 @@ use ipopt_sys as ffi;
 
 use super::application::Callbacks;
 use super::layout::{Layout, Structure};
+use super::plug::Plugged;
 use super::{INTERRUPT, IterationRecord, Mode, NlpProblem, OnIteration};
 
 /// Why a solve is to stop.
@@ -39,6 +40,10 @@ pub struct Session<'a, P> {
     pub last_x: Vec<f64>,
     /// g at that point.
     pub last_constraints: Vec<f64>,
+    /// The point of the last iteration.
+    shown_x: Vec<f64>,
+    /// Iterations before this run of Ipopt.
+    pub num_before: usize,
     /// The iterations so far.
     pub history: Vec<IterationRecord>,
     /// Why to stop, once that is decided.
@@ -61,9 +66,17 @@ impl<'a, P: NlpProblem> Session<'a, P> {
             evaluation_time: Duration::ZERO,
             last_x: x.to_vec(),
             last_constraints: vec![f64::NAN; layout.num_constraints],
+            shown_x: x.to_vec(),
+            num_before: 0,
             history: Vec::new(),
             stop: None,
         }
+    }
+
+    /// Prepares for another run of Ipopt, from the point of the last iteration, which is returned.
+    pub fn continue_anew(&mut self) -> Vec<f64> {
+        self.num_before = self.history.last().map_or(0, |record| record.iteration);
+        self.shown_x.clone()
     }
 
     /// Lets the problem fill `out`, in measured time; with zeros after a panic.
@@ -81,8 +94,15 @@ impl<'a, P: NlpProblem> Session<'a, P> {
     }
 
     /// Remembers the iteration, tells `on_iteration`, and says whether to go on.
-    fn iterate(&mut self, record: IterationRecord) -> bool {
-        if self.stop.is_none() {
+    fn iterate(&mut self, mut record: IterationRecord) -> bool {
+        if Plugged::has_failed() {
+            return false;
+        }
+        // The point from which a run goes on has its record.
+        let is_known = record.iteration == 0 && !self.history.is_empty();
+        record.iteration += self.num_before;
+        if self.stop.is_none() && !is_known {
+            self.shown_x.copy_from_slice(&self.last_x);
             let asked = catch_unwind(AssertUnwindSafe(|| (self.on_iteration)(&record, &self.last_x)));
             self.history.push(record);
             self.stop = match asked {

@@ -93,6 +93,12 @@ pub enum IpoptError {
     /// `hessian_approximation = exact` without a Hessian.
     #[error("hessian_approximation = exact, but the problem has no Hessian")]
     NoHessian,
+    /// `linear_solver = "faer"` with an Ipopt that cannot take it.
+    #[error(
+        "linear_solver = \"faer\", but this Ipopt cannot take it: it has no function to set MA57's routines \
+         (Ipopt 3.11 to 3.14 built with the linear solver loader have one); use \"auto\" or \"mumps\""
+    )]
+    NoFaer,
     /// A solve was started from within the callbacks of another one.
     #[error("a solve was started from inside another solve; Ipopt can run only one at a time")]
     Nested,
@@ -108,7 +114,7 @@ impl From<IpoptError> for crate::Error {
     /// Options come from the user; everything else is a mistake in the program.
     fn from(error: IpoptError) -> Self {
         match error {
-            IpoptError::OptionRejected { .. } | IpoptError::OptionReserved(_) => {
+            IpoptError::OptionRejected { .. } | IpoptError::OptionReserved(_) | IpoptError::NoFaer => {
                 Self::Input(error.to_string())
             }
             _ => Self::Internal(error.to_string()),

@@ -14,7 +14,10 @@
 //! - A panic in the problem stops the solve and goes on in the caller once Ipopt has cleaned up.
 //! - Ctrl-C, once [`install_ctrl_c`] was called, stops the solve at the next iteration; see [`INTERRUPT`].
 //!
-//! This module is the only place in the crate with `unsafe` code: in `application`, `callbacks`, `memory` and one call in `solve`.
+//! - The systems of equations of each iteration are solved by crate `kkt` in the place of Ipopt's linear solver, or by MUMPS; see
+//!   [`LinearSolver`].
+//!
+//! This module is the only place in the crate with `unsafe` code: in `application`, `callbacks`, `memory`, `plug` and one call in `solve`.
 
 use std::ops::ControlFlow;
 
@@ -23,14 +26,17 @@ mod callbacks;
 mod error;
 mod interrupt;
 mod layout;
+mod linear_solver;
 mod lock;
 mod memory;
 mod options;
+mod plug;
 mod solution;
 mod solve;
 
 pub use error::IpoptError;
 pub use interrupt::{INTERRUPT, InterruptFlag, install_ctrl_c};
+pub use linear_solver::LinearSolver;
 pub use memory::keep_freed_memory;
 pub use options::{OptionValue, Options};
 pub use solution::{IterationRecord, Mode, Multipliers, Solution, Status};

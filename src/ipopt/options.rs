@@ -1,10 +1,16 @@
 //! Ipopt's options, collected with their types and checked by Ipopt itself, in silence, before a solve.
 
-use super::IpoptError;
 use super::application::Application;
+use super::{IpoptError, LinearSolver, plug};
 
-/// What [`super::solve`] relies on: no option file, and its own value for "no bound".
-const RESERVED: [&str; 3] = ["option_file_name", "nlp_lower_bound_inf", "nlp_upper_bound_inf"];
+/// What [`super::solve`] relies on: no option file, its own value for "no bound", and a linear solver that it has chosen.
+const RESERVED: [&str; 5] = [
+    "option_file_name",
+    "nlp_lower_bound_inf",
+    "nlp_upper_bound_inf",
+    "linear_solver",
+    "linear_system_scaling",
+];
 
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,10 +32,12 @@ pub enum OptionValue {
 ///
 /// Where they differ from Ipopt's defaults: silent (`print_level` 0, `sb` yes), `check_derivatives_for_naninf` yes,
 /// `hessian_approximation` by whether the problem has a Hessian, `warm_start_init_point` by whether
-/// multipliers are given. All of these can be set; `option_file_name` and `nlp_…_bound_inf` cannot.
+/// multipliers are given. All of these can be set; `option_file_name`, `nlp_…_bound_inf`, `linear_system_scaling` and `linear_solver` (see
+/// [`Options::linear_solver`]) cannot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     settings: Vec<(String, OptionValue)>,
+    pub(super) linear_solver: LinearSolver,
 }
 
 impl Options {
@@ -37,6 +45,12 @@ impl Options {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Chooses the linear solver.
+    #[must_use]
+    pub fn linear_solver(self, linear_solver: LinearSolver) -> Self {
+        Self { linear_solver, ..self }
     }
 
     /// Sets an option that takes an integer.
@@ -76,6 +90,7 @@ impl Options {
     pub(super) fn apply(
         &self,
         application: &mut Application,
+        linear_solver: LinearSolver,
         has_hessian: bool,
         warm_start: bool,
     ) -> Result<(), IpoptError> {
@@ -83,14 +98,19 @@ impl Options {
         if wants_exact && !has_hessian {
             return Err(IpoptError::NoHessian);
         }
+        if let Some((name, _)) = self.settings.iter().find(|(name, _)| RESERVED.contains(&name.as_str())) {
+            return Err(IpoptError::OptionReserved(name.clone()));
+        }
         let defaults = Self::new()
             .set_str("check_derivatives_for_naninf", "yes")
             .set_str("hessian_approximation", if has_hessian { "exact" } else { "limited-memory" })
-            .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" });
+            .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" })
+            .set_str("linear_system_scaling", "none");
+        let defaults = match linear_solver {
+            LinearSolver::Faer => plug::configure(defaults),
+            _ => defaults.set_str("linear_solver", "mumps"),
+        };
         for (name, value) in defaults.settings.iter().chain(&self.settings) {
-            if RESERVED.contains(&name.as_str()) {
-                return Err(IpoptError::OptionReserved(name.clone()));
-            }
             if !application.set_option(name, value) {
                 return Err(IpoptError::OptionRejected { name: name.clone(), value: value.clone() });
             }

@@ -5,6 +5,8 @@ use std::fmt;
 use ipopt_sys as ffi;
 use serde::Serialize;
 
+use super::LinearSolver;
+
 /// Which phase of Ipopt's algorithm an iteration belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -74,6 +76,8 @@ pub struct Solution {
     pub upper_multipliers: Vec<f64>,
     /// How it ended.
     pub status: Status,
+    /// Faer or MUMPS, whichever came last.
+    pub linear_solver: LinearSolver,
     /// Every iteration, from the initial point on.
     pub history: Vec<IterationRecord>,
     /// s inside the problem's functions, wall clock.

@@ -188,6 +188,9 @@ pub struct MetaSolver {
     pub iterations: usize,
     /// Largest violation, units of the NLP.
     pub max_violation: f64,
+    /// What solved the systems of equations inside Ipopt: `faer` or `mumps`; no text in plans of versions that knew only MUMPS.
+    #[serde(default)]
+    pub linear_solver: String,
     /// Where the time went.
     pub seconds: Seconds,
 }

@@ -146,6 +146,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
             success: motion.solved,
             iterations: motion.iterations,
             max_violation: motion.max_violation(),
+            linear_solver: motion.linear_solver.to_string(),
             seconds: Seconds {
                 map: provenance.map_seconds,
                 total: motion.seconds.total + provenance.map_seconds,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::violation::BlockViolation;
-use crate::ipopt::IterationRecord;
+use crate::ipopt::{IterationRecord, LinearSolver};
 use crate::nlp::Model;
 
 /// Where the wall time of a solve went, s.
@@ -39,6 +39,8 @@ pub struct Motion {
     pub violations: Vec<BlockViolation>,
     /// Every iteration of every stage; seconds count from the start of the solve.
     pub history: Vec<IterationRecord>,
+    /// The linear solver that Ipopt used in the last stage.
+    pub linear_solver: LinearSolver,
     /// Where the time went; the map's is not included.
     pub seconds: Seconds,
 }

@@ -17,6 +17,7 @@ pub(super) fn of(solver: &SolverSpec, hessian: Hessian, centered: bool, max_iter
     let options =
         if centered { Options::new().set_num("sigma_min", LEAST_CENTERING) } else { Options::new() };
     options
+        .linear_solver(solver.linear_solver)
         .set_int("max_iter", max_iterations as i32)
         .set_str(
             "hessian_approximation",

@@ -12,7 +12,7 @@ use super::stage::Stage;
 use super::stopping::StoppingRule;
 use super::violation;
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, IterationRecord, Status};
+use crate::ipopt::{self, IterationRecord, LinearSolver, Status};
 use crate::nlp::Model;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
@@ -129,6 +129,7 @@ struct Solve<'a> {
     start: Instant,
     history: Vec<IterationRecord>,
     iterations: usize,
+    linear_solver: LinearSolver,
     seconds: Seconds,
 }
 
@@ -140,6 +141,7 @@ impl<'a> Solve<'a> {
             start: Instant::now(),
             history: Vec::new(),
             iterations: 0,
+            linear_solver: task.scenario.solver.linear_solver,
             seconds: Seconds::default(),
         }
     }
@@ -264,6 +266,7 @@ impl<'a> Solve<'a> {
             rule.observe(record, x)
         })
         .map_err(|error| Error::Internal(error.to_string()))?;
+        self.linear_solver = solution.linear_solver;
         self.iterations += solution.history.last().map_or(0, |r| r.iteration);
         self.seconds.evaluation += solution.evaluation_seconds;
         self.seconds.linear_solver += solution.total_seconds - solution.evaluation_seconds;
@@ -291,6 +294,7 @@ impl<'a> Solve<'a> {
             iterations: self.iterations,
             violations,
             history: self.history,
+            linear_solver: self.linear_solver,
             seconds: self.seconds,
         }
     }

@@ -32,10 +32,17 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     durations(document, scenario)?;
     phases(document, scenario)?;
     if let Some(robot) = robot {
+        linear_solver(document, scenario)?;
         adhesive_feet(document, scenario, robot)?;
         phases_by_foot(document, scenario, robot)?;
     }
     Ok(())
+}
+
+/// Refuses a linear solver that this Ipopt cannot use. A plan that was made with it elsewhere may be checked here all the same.
+fn linear_solver(document: &Document, scenario: &Scenario) -> Result<()> {
+    let chosen = scenario.solver.linear_solver;
+    chosen.check().map_err(|e| document.error("solver.linear_solver", format!("given \"{chosen}\": {e}")))
 }
 
 fn one_robot(document: &Document) -> Result<()> {

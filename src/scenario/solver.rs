@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::ipopt::LinearSolver;
+
 /// Which Hessian Ipopt gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -64,6 +66,8 @@ pub struct SolverSpec {
     /// Number of steps that the limited-memory Hessian remembers.
     #[schemars(range(min = 1, max = 1000))]
     pub hessian_memory: usize,
+    /// Which linear solver Ipopt uses.
+    pub linear_solver: LinearSolver,
     /// When to stop.
     pub effort: Effort,
     /// Threads that evaluate the derivatives of the NLP; the linear solver uses one.
@@ -79,6 +83,7 @@ impl Default for SolverSpec {
             continuation: Continuation::Mode(ContinuationMode::Auto),
             hessian: None,
             hessian_memory: 6,
+            linear_solver: LinearSolver::Auto,
             effort: Effort::Smooth,
             threads: 1,
         }

@@ -124,6 +124,7 @@ pub fn standing() -> Plan {
                 success: true,
                 iterations: 3,
                 max_violation: 1e-6,
+                linear_solver: "faer".into(),
                 seconds: Seconds { total: 0.3, ..Default::default() },
             },
             checks: Vec::new(),

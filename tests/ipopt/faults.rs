@@ -206,6 +206,8 @@ fn wrong_options_are_refused() {
     }
     let reserved = Options::new().set_str("option_file_name", "ipopt.opt");
     assert_eq!(attempt(reserved), Err(IpoptError::OptionReserved("option_file_name".into())));
+    let linear_solver = Options::new().set_str("linear_solver", "ma27");
+    assert_eq!(attempt(linear_solver), Err(IpoptError::OptionReserved("linear_solver".into())));
     let exact = Options::new().set_str("hessian_approximation", "exact");
     assert_eq!(attempt(exact), Err(IpoptError::NoHessian));
 }

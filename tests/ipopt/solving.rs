@@ -4,9 +4,11 @@ use std::ops::ControlFlow;
 use std::thread;
 use std::time::Duration;
 
-use warpgait::ipopt::{IterationRecord, Mode, NlpProblem, Options, Solution, Status, solve};
+use warpgait::ipopt::{IterationRecord, LinearSolver, Mode, NlpProblem, Options, Solution, Status, solve};
 
 use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, Wavy, go_on, run};
+
+const LINEAR_SOLVERS: [LinearSolver; 2] = [LinearSolver::Faer, LinearSolver::Mumps];
 
 #[track_caller]
 fn assert_is_hs071(solution: &Solution) {
@@ -25,8 +27,14 @@ fn without_times(history: &[IterationRecord]) -> Vec<IterationRecord> {
 
 #[test]
 fn hs071_with_the_exact_hessian() {
-    let solution = run(&mut Hs071::new(true), &Options::new()).unwrap();
+    let lengths = LINEAR_SOLVERS.map(hs071_with);
+    assert_eq!(lengths[0], lengths[1], "both linear solvers take the same iterations");
+}
+
+fn hs071_with(linear_solver: LinearSolver) -> usize {
+    let solution = run(&mut Hs071::new(true), &Options::new().linear_solver(linear_solver)).unwrap();
     assert_is_hs071(&solution);
+    assert_eq!(solution.linear_solver, linear_solver);
     assert!((solution.constraints[0] - 25.0).abs() < 1e-6);
     assert!((solution.constraints[1] - 40.0).abs() < 1e-6);
     // Stationarity: ∇f + Jᵀλ − z_lower + z_upper = 0.
@@ -40,37 +48,66 @@ fn hs071_with_the_exact_hessian() {
         assert!((gradient[i] + pull + bounds).abs() < 1e-6);
     }
     assert!(solution.lower_multipliers[0] > 1.0, "the lower bound of x₀ is active");
+    solution.history.len()
 }
 
 #[test]
 fn hs071_with_limited_memory() {
     let mut problem = Hs071::new(false);
     problem.on_call = Box::new(|function| assert_ne!(function, "hessian"));
-    assert_is_hs071(&run(&mut problem, &Options::new()).unwrap());
+    for linear_solver in LINEAR_SOLVERS {
+        let solution = run(&mut problem, &Options::new().linear_solver(linear_solver)).unwrap();
+        assert_is_hs071(&solution);
+        assert_eq!(solution.linear_solver, linear_solver);
+    }
 }
 
+/// Under each of Ipopt's treatments of fixed variables.
 #[test]
 fn no_constraints_and_a_fixed_variable() {
-    let mut seen = Vec::new();
-    let solution = solve(&mut Unconstrained, &Options::new(), None, &mut |_, x| {
-        seen = x.to_vec();
-        ControlFlow::Continue(())
-    })
-    .unwrap();
-    assert!(solution.status.converged(), "{}", solution.status);
-    assert_eq!(solution.x[0], 3.0);
-    assert!((solution.x[1] - 1.0).abs() < 0.01 && (solution.x[2] - 2.5).abs() < 1e-6);
-    // Apart from the 1e-8 by which Ipopt relaxes bounds on its way.
-    assert!(seen.iter().zip(&solution.x).all(|(a, b)| (a - b).abs() < 1e-7));
+    let treatments = ["make_parameter", "make_constraint", "relax_bounds"];
+    for (treatment, linear_solver) in treatments.iter().flat_map(|t| LINEAR_SOLVERS.map(|s| (t, s))) {
+        let options =
+            Options::new().linear_solver(linear_solver).set_str("fixed_variable_treatment", treatment);
+        let mut seen = Vec::new();
+        let solution = solve(&mut Unconstrained, &options, None, &mut |_, x| {
+            seen = x.to_vec();
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert!(solution.status.converged(), "{treatment}: {}", solution.status);
+        assert_eq!(solution.linear_solver, linear_solver);
+        assert!((solution.x[0] - 3.0).abs() < 1e-7);
+        assert!((solution.x[1] - 1.0).abs() < 0.01 && (solution.x[2] - 2.5).abs() < 1e-6);
+        // Apart from the 1e-8 by which Ipopt relaxes bounds on its way.
+        assert!(seen.iter().zip(&solution.x).all(|(a, b)| (a - b).abs() < 1e-7));
+    }
 }
 
 #[test]
 fn an_infeasible_problem_is_called_so() {
-    let solution = run(&mut Circle { right_side: -1.0 }, &Options::new()).unwrap();
-    assert_eq!(solution.status, Status::Infeasible);
-    assert!(!solution.status.converged());
-    assert!(solution.history.iter().any(|record| record.mode == Mode::Restoration));
-    assert!((solution.history.last().unwrap().violation - 1.0).abs() < 1e-3);
+    for linear_solver in LINEAR_SOLVERS {
+        let options = Options::new().linear_solver(linear_solver);
+        let solution = run(&mut Circle { right_side: -1.0 }, &options).unwrap();
+        assert_eq!(solution.status, Status::Infeasible);
+        assert_eq!(solution.linear_solver, linear_solver);
+        assert!(!solution.status.converged());
+        assert!(solution.history.iter().any(|record| record.mode == Mode::Restoration));
+        assert!((solution.history.last().unwrap().violation - 1.0).abs() < 1e-3);
+    }
+}
+
+/// Ipopt's own extension of the matrix by the low-rank Hessian is none that faer knows.
+#[test]
+fn mumps_goes_on_where_faer_fails() {
+    let extended = Options::new().set_str("limited_memory_aug_solver", "extended");
+    let by_faer = run(&mut Hs071::new(false), &extended.clone().linear_solver(LinearSolver::Faer)).unwrap();
+    assert_is_hs071(&by_faer);
+    assert_eq!(by_faer.linear_solver, LinearSolver::Mumps);
+    let iterations: Vec<usize> = by_faer.history.iter().map(|record| record.iteration).collect();
+    assert_eq!(iterations, (0..iterations.len()).collect::<Vec<_>>());
+    let by_mumps = run(&mut Hs071::new(false), &extended.linear_solver(LinearSolver::Mumps)).unwrap();
+    assert_eq!(by_faer.x, by_mumps.x);
 }
 
 /// The point that `on_iteration` gets is Ipopt's current iterate: f there is the objective that Ipopt reports; and the
