@@ -14,9 +14,11 @@ use std::time::{Duration, Instant};
 use ipopt_sys as ffi;
 
 use super::application::Callbacks;
-use super::layout::{Layout, Structure};
+use super::interrupt::INTERRUPT;
+use super::layout::{ProblemLayout, Structure};
 use super::plug::Plugged;
-use super::{INTERRUPT, IterationRecord, Mode, NlpProblem, OnIteration};
+use super::problem::{NlpProblem, OnIteration};
+use super::solution::{IterationRecord, Mode};
 
 /// Why a solve is to stop.
 pub enum Stop {
@@ -32,7 +34,7 @@ pub enum Stop {
 pub struct Session<'a, P> {
     problem: &'a mut P,
     on_iteration: &'a mut OnIteration<'a>,
-    layout: &'a Layout,
+    layout: &'a ProblemLayout,
     started: Instant,
     /// Time inside the problem's functions.
     pub evaluation_time: Duration,
@@ -55,7 +57,7 @@ impl<'a, P: NlpProblem> Session<'a, P> {
     pub fn new(
         problem: &'a mut P,
         on_iteration: &'a mut OnIteration<'a>,
-        layout: &'a Layout,
+        layout: &'a ProblemLayout,
         x: &[f64],
     ) -> Self {
         Self {
@@ -153,7 +155,7 @@ unsafe fn input<'s>(start: *const ffi::Number, len: usize) -> &'s [f64] {
     unsafe { slice::from_raw_parts(start, len) }
 }
 
-/// An array for results, filled with NaN: Ipopt does not initialise it, and entries that the problem forgets are noticed.
+/// An array for results, filled with NaN: Ipopt does not initialize it, and entries that the problem forgets are noticed.
 ///
 /// # Safety
 /// As said above.

@@ -1,6 +1,6 @@
 //! What is found wrong before a solve.
 
-use super::OptionValue;
+use super::option_value::OptionValue;
 
 /// A mistake in the problem, the options or the use of the solver, found before the solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

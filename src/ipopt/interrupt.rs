@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::IpoptError;
+use super::error::IpoptError;
 
 /// A program that ends because of SIGINT has this exit code: 128 + 2.
 const EXIT_CODE: i32 = 130;

@@ -1,6 +1,8 @@
 //! The fixed part of a problem: sizes, bounds and sparsity, read once and checked.
 
-use super::{IpoptError, Multipliers, NlpProblem};
+use super::error::IpoptError;
+use super::problem::NlpProblem;
+use super::solution::Multipliers;
 
 /// Beyond ±1e19 Ipopt takes a bound for none.
 const NO_BOUND: f64 = 2e19;
@@ -21,7 +23,7 @@ impl Structure {
 
 /// Sizes, bounds and sparsity of a problem that Ipopt can take.
 #[derive(Debug)]
-pub struct Layout {
+pub struct ProblemLayout {
     pub num_variables: usize,
     pub num_constraints: usize,
     pub variable_lower: Vec<f64>,
@@ -32,7 +34,7 @@ pub struct Layout {
     pub hessian: Option<Structure>,
 }
 
-impl Layout {
+impl ProblemLayout {
     /// Asks the problem, and checks what it says.
     ///
     /// # Errors

@@ -1,7 +1,9 @@
 //! Ipopt's options, collected with their types and checked by Ipopt itself, in silence, before a solve.
 
 use super::application::Application;
-use super::{IpoptError, LinearSolver, plug};
+use super::error::IpoptError;
+use super::linear_solver::LinearSolver;
+use super::option_value::OptionValue;
 
 /// What [`super::solve`] relies on: no option file, its own value for "no bound", and a linear solver that it has chosen.
 const RESERVED: [&str; 5] = [
@@ -11,17 +13,6 @@ const RESERVED: [&str; 5] = [
     "linear_solver",
     "linear_system_scaling",
 ];
-
-/// The value of an option.
-#[derive(Clone, Debug, PartialEq)]
-pub enum OptionValue {
-    /// For options that count.
-    Int(i32),
-    /// For tolerances and the like. Ipopt 3.11 keeps six significant digits.
-    Num(f64),
-    /// For options that choose, and yes or no.
-    Str(String),
-}
 
 /// Options for Ipopt, by the names in its manual. Of two settings of one option the later one counts.
 ///
@@ -107,7 +98,7 @@ impl Options {
             .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" })
             .set_str("linear_system_scaling", "none");
         let defaults = match linear_solver {
-            LinearSolver::Faer => plug::configure(defaults),
+            LinearSolver::Faer => with_plug(defaults),
             _ => defaults.set_str("linear_solver", "mumps"),
         };
         for (name, value) in defaults.settings.iter().chain(&self.settings) {
@@ -117,4 +108,14 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// The options that go with the plugged-in linear solver. Its solutions are refined already, so Ipopt refines only where its own
+/// test demands it; and it has no better factorization to offer, which a larger `ma57_pivtol` would request.
+fn with_plug(options: Options) -> Options {
+    options
+        .set_str("linear_solver", "ma57")
+        .set_int("min_refinement_steps", 0)
+        .set_num("ma57_pivtol", 1e-8)
+        .set_num("ma57_pivtolmax", 1e-8)
 }

@@ -12,8 +12,7 @@ use std::slice;
 use ipopt_sys::ma57;
 use kkt::{Factored, Kkt};
 
-use super::Options;
-use super::layout::Layout;
+use super::layout::ProblemLayout;
 use super::lock::SolverLock;
 
 /// What MA57's `info(1)` says.
@@ -30,17 +29,6 @@ mod info {
     pub const LENGTHS: [usize; 2] = [8, 9];
     pub const NEGATIVE: usize = 23;
     pub const RANK: usize = 24;
-}
-
-/// Ipopt's options for a solve with the plug. The solves are refined already, so Ipopt refines only where its own test asks for it; and there is
-/// no better factorization to be had (`ma57_pivtol` would ask for one).
-pub fn configure(options: Options) -> Options {
-    let refinements = std::env::var("KKT_MIN").map_or(0, |v| v.parse().unwrap());
-    options
-        .set_str("linear_solver", "ma57")
-        .set_int("min_refinement_steps", refinements)
-        .set_num("ma57_pivtol", 1e-8)
-        .set_num("ma57_pivtolmax", 1e-8)
 }
 
 /// What the five functions share.
@@ -76,7 +64,7 @@ pub struct Outcome {
 
 impl<'lock> Plugged<'lock> {
     /// Plugs the linear solver in for problems of this layout; `None` if the library cannot take it.
-    pub fn new(layout: &Layout, lock: &'lock SolverLock) -> Option<Self> {
+    pub fn new(layout: &ProblemLayout, lock: &'lock SolverLock) -> Option<Self> {
         let set_functions = ma57::set_functions()?;
         STATE.set(Some(State { layouts: layouts(layout), ..State::default() }));
         // SAFETY: the five functions have the signatures that Ipopt's interface to MA57 calls and live as long as the process.
@@ -127,7 +115,7 @@ fn with_state<R>(use_it: impl FnOnce(&mut State) -> R) -> Option<R> {
 /// The blocks of the matrix under each of Ipopt's three treatments of fixed variables: taken out (`make_parameter`, the default), left in
 /// with relaxed bounds (`relax_bounds`, what the first becomes when there are more equations than free variables), and left in with an
 /// equation each (`make_constraint`). The order of the matrix tells which one it is.
-fn layouts(layout: &Layout) -> Vec<kkt::Layout> {
+fn layouts(layout: &ProblemLayout) -> Vec<kkt::Layout> {
     let equal = |lower: &[f64], upper: &[f64]| lower.iter().zip(upper).filter(|(a, b)| a == b).count();
     let fixed = equal(&layout.variable_lower, &layout.variable_upper);
     let equations = equal(&layout.constraint_lower, &layout.constraint_upper);

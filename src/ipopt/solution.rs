@@ -5,15 +5,15 @@ use std::fmt;
 use ipopt_sys as ffi;
 use serde::Serialize;
 
-use super::LinearSolver;
+use super::linear_solver::LinearSolver;
 
 /// Which phase of Ipopt's algorithm an iteration belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// Towards the optimum.
+    /// Toward the optimum.
     Regular,
-    /// Towards feasibility alone, after the line search failed.
+    /// Toward feasibility alone, after the line search failed.
     Restoration,
 }
 
