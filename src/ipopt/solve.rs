@@ -11,7 +11,9 @@ use super::layout::Layout;
 use super::linear_solver::go_on;
 use super::lock::SolverLock;
 use super::plug::{Outcome, Plugged};
-use super::{IpoptError, LinearSolver, Multipliers, NlpProblem, OnIteration, OptionValue, Options, Solution, Status};
+use super::{
+    IpoptError, LinearSolver, Multipliers, NlpProblem, OnIteration, OptionValue, Options, Solution, Status,
+};
 
 /// Ipopt's default.
 const IPOPTS_MAX_ITER: i32 = 3000;

@@ -57,7 +57,8 @@ fn solve_in_silence() {
         assert!(run(&mut Hs071::new(true), &refused).is_err());
     }
     // A scaling that needs what is not installed is found out only when the solve begins.
-    let absent = run(&mut Hs071::new(true), &Options::new().set_str("nlp_scaling_method", "equilibration-based"));
+    let absent =
+        run(&mut Hs071::new(true), &Options::new().set_str("nlp_scaling_method", "equilibration-based"));
     assert_eq!(absent.unwrap().status, Status::InvalidOption);
 }
 

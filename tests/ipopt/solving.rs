@@ -67,7 +67,8 @@ fn hs071_with_limited_memory() {
 fn no_constraints_and_a_fixed_variable() {
     let treatments = ["make_parameter", "make_constraint", "relax_bounds"];
     for (treatment, linear_solver) in treatments.iter().flat_map(|t| LINEAR_SOLVERS.map(|s| (t, s))) {
-        let options = Options::new().linear_solver(linear_solver).set_str("fixed_variable_treatment", treatment);
+        let options =
+            Options::new().linear_solver(linear_solver).set_str("fixed_variable_treatment", treatment);
         let mut seen = Vec::new();
         let solution = solve(&mut Unconstrained, &options, None, &mut |_, x| {
             seen = x.to_vec();
