@@ -31,6 +31,10 @@ mod info {
     pub const RANK: usize = 24;
 }
 
+/// A solution that is refined and still has a larger residual, relative to the solution and the right-hand side, counts as failed. (Ipopt's
+/// own test demands 1e-10 and accepts what is below 1e-5.)
+const LARGEST_RESIDUAL: f64 = 1e-8;
+
 /// What the five functions share.
 #[derive(Default)]
 struct State {
@@ -91,19 +95,6 @@ impl<'lock> Plugged<'lock> {
 
 impl Drop for Plugged<'_> {
     fn drop(&mut self) {
-        if std::env::var_os("KKT_STAT").is_some() {
-            with_state(|state| {
-                for kkt in &state.matrices {
-                    eprintln!(
-                        "KKT n {} condensed {} nnzL {} {:?}",
-                        kkt.dimension(),
-                        kkt.num_condensed(),
-                        kkt.factor_len(),
-                        kkt.statistics
-                    );
-                }
-            });
-        }
         STATE.set(None);
     }
 }
@@ -268,7 +259,10 @@ unsafe extern "C" fn solve(
             return info::FAILED;
         };
         for right_side in right_sides.chunks_exact_mut(n) {
-            kkt.solve(right_side);
+            let residual = kkt.solve(right_side);
+            if residual > LARGEST_RESIDUAL || residual.is_nan() {
+                return info::FAILED;
+            }
         }
         info::DONE
     });

@@ -56,10 +56,10 @@ fn solve_in_silence() {
     ] {
         assert!(run(&mut Hs071::new(true), &refused).is_err());
     }
-    // A scaling that needs what is not installed is found out only when the solve begins.
-    let absent =
-        run(&mut Hs071::new(true), &Options::new().set_str("nlp_scaling_method", "equilibration-based"));
-    assert_eq!(absent.unwrap().status, Status::InvalidOption);
+    // Options that contradict each other are found out only when the solve begins.
+    let contradiction = Options::new().set_int("min_refinement_steps", 5).set_int("max_refinement_steps", 4);
+    let invalid = run(&mut Hs071::new(true), &contradiction);
+    assert_eq!(invalid.unwrap().status, Status::InvalidOption);
 }
 
 #[test]
