@@ -84,10 +84,10 @@ impl<'lock> Application<'lock> {
         }
     }
 
-    /// Turns off every output and the option file. Says whether Ipopt accepted that.
+    /// Turns off every output and the option file. Returns whether Ipopt accepted that.
     ///
-    /// A fresh Ipopt prints what it thinks of a wrong option, for its print level takes effect only when a solve
-    /// begins. So one is begun here without a point to start from, which Ipopt declines after it has read its options.
+    /// A fresh Ipopt prints a message about a wrong option, because its print level takes effect only when a solve begins. So a solve
+    /// is started here without an initial point, which Ipopt declines after it has read its options.
     fn silence(&mut self) -> bool {
         let accepted = [
             ("print_level", OptionValue::Int(0)),

@@ -1,4 +1,4 @@
-//! What is found wrong before a solve.
+//! Mistakes that are found before a solve.
 
 use super::option_value::OptionValue;
 
@@ -93,9 +93,9 @@ pub enum IpoptError {
     /// `hessian_approximation = exact` without a Hessian.
     #[error("hessian_approximation = exact, but the problem has no Hessian")]
     NoHessian,
-    /// `linear_solver = "faer"` with an Ipopt that cannot take it.
+    /// `linear_solver = "faer"` with an Ipopt that cannot use it.
     #[error(
-        "linear_solver = \"faer\", but this Ipopt cannot take it: it has no function to set MA57's routines \
+        "linear_solver = \"faer\", but this Ipopt cannot use it: it has no function that sets MA57's routines \
          (Ipopt 3.11 to 3.14 built with the linear solver loader have one); use \"auto\" or \"mumps\""
     )]
     NoFaer,

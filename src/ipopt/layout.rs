@@ -4,7 +4,7 @@ use super::error::IpoptError;
 use super::problem::NlpProblem;
 use super::solution::Multipliers;
 
-/// Beyond ±1e19 Ipopt takes a bound for none.
+/// Ipopt treats a bound beyond ±1e19 as no bound.
 const NO_BOUND: f64 = 2e19;
 
 /// Rows and columns of the entries of a sparse matrix, 0-based.
@@ -21,7 +21,7 @@ impl Structure {
     }
 }
 
-/// Sizes, bounds and sparsity of a problem that Ipopt can take.
+/// Sizes, bounds and sparsity of a problem that Ipopt can solve.
 #[derive(Debug)]
 pub struct ProblemLayout {
     pub num_variables: usize,
@@ -35,7 +35,7 @@ pub struct ProblemLayout {
 }
 
 impl ProblemLayout {
-    /// Asks the problem, and checks what it says.
+    /// Queries the problem and checks its answers.
     ///
     /// # Errors
     /// The first thing that is wrong.
@@ -64,7 +64,7 @@ impl ProblemLayout {
         })
     }
 
-    /// The point to start from, (n,).
+    /// The initial point, (n,).
     ///
     /// # Errors
     /// When a value is not finite.
@@ -75,7 +75,7 @@ impl ProblemLayout {
         Ok(x)
     }
 
-    /// The multipliers to start from: the given ones, or zeros, which Ipopt then does not look at.
+    /// The initial multipliers: the given ones, or zeros, which Ipopt then ignores.
     ///
     /// # Errors
     /// When they have the wrong length or are not finite.

@@ -1,4 +1,4 @@
-//! Ipopt's options, collected with their types and checked by Ipopt itself, in silence, before a solve.
+//! Ipopt's options, collected with their types and checked by Ipopt itself before a solve, without output.
 
 use super::application::Application;
 use super::error::IpoptError;
@@ -14,7 +14,7 @@ const RESERVED: [&str; 5] = [
     "linear_system_scaling",
 ];
 
-/// Options for Ipopt, by the names in its manual. Of two settings of one option the later one counts.
+/// Options for Ipopt, by the names in its manual. A later setting of an option overrides an earlier one.
 ///
 /// ```
 /// use warpgait::ipopt::Options;
@@ -74,7 +74,7 @@ impl Options {
         self.settings.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
-    /// Hands every setting to Ipopt, which must have been silenced before.
+    /// Passes every setting to Ipopt, which must have been silenced before.
     ///
     /// # Errors
     /// The first setting that Ipopt, or this interface, does not accept.

@@ -1,7 +1,7 @@
-//! The linear solver of crate `kkt` in the place of MA57, inside Ipopt.
+//! The linear solver of the crate `kkt`, plugged into Ipopt as MA57.
 //!
-//! Ipopt calls five functions without any user data, always from the thread that solves. What they share is therefore a value of that thread,
-//! present as long as [`Plugged`] lives.
+//! Ipopt calls five functions without any user data, always from the thread that solves. Their state is therefore thread-local,
+//! and exists as long as [`Plugged`].
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -15,7 +15,7 @@ use kkt::{Factored, Kkt};
 use super::layout::ProblemLayout;
 use super::lock::SolverLock;
 
-/// What MA57's `info(1)` says.
+/// Values of MA57's `info(1)`.
 mod info {
     use std::ffi::c_int;
 
@@ -24,7 +24,7 @@ mod info {
     pub const SINGULAR: c_int = 4;
     /// Ipopt then gives up on the step.
     pub const FAILED: c_int = -1;
-    /// Places in `info`: what to say, the lengths of two arrays that nobody uses, negative eigenvalues, rank.
+    /// Places in `info`: the outcome, the lengths of two arrays that are not used, negative eigenvalues, rank.
     pub const STATUS: usize = 0;
     pub const LENGTHS: [usize; 2] = [8, 9];
     pub const NEGATIVE: usize = 23;
@@ -35,11 +35,11 @@ mod info {
 /// own test demands 1e-10 and accepts what is below 1e-5.)
 const LARGEST_RESIDUAL: f64 = 1e-8;
 
-/// What the five functions share.
+/// The state of the five functions.
 #[derive(Default)]
 struct State {
     layouts: Vec<kkt::Layout>,
-    /// One for each time that Ipopt has asked for an analysis. Ipopt refers to them by their position plus one.
+    /// One for each analysis. Ipopt refers to them by their position plus one.
     matrices: Vec<Kkt>,
     failed: bool,
     panic: Option<Box<dyn Any + Send>>,
@@ -49,25 +49,25 @@ thread_local! {
     static STATE: RefCell<Option<State>> = const { RefCell::new(None) };
 }
 
-/// While this lives, Ipopt's "ma57" is the linear solver of crate `kkt`. Frees the factors when dropped.
+/// While this exists, Ipopt's "ma57" is the linear solver of the crate `kkt`. Frees the factors when dropped.
 pub struct Plugged<'lock> {
     _lock: &'lock SolverLock,
 }
 
-/// What became of the linear solver in a solve.
+/// How the linear solver fared in a solve.
 pub struct Outcome {
-    /// Something was wrong for which Ipopt has no remedy.
+    /// An error from which Ipopt cannot recover.
     pub failed: bool,
     /// Matrices that counted as singular.
     pub singular: usize,
-    /// Whether Ipopt has called at all.
+    /// Whether Ipopt called it at all.
     pub used: bool,
     /// A panic, to be resumed.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<'lock> Plugged<'lock> {
-    /// Plugs the linear solver in for problems of this layout; `None` if the library cannot take it.
+    /// Plugs the linear solver in for problems of this layout; `None` if the library cannot use it.
     pub fn new(layout: &ProblemLayout, lock: &'lock SolverLock) -> Option<Self> {
         let set_functions = ma57::set_functions()?;
         STATE.set(Some(State { layouts: layouts(layout), ..State::default() }));
@@ -76,7 +76,7 @@ impl<'lock> Plugged<'lock> {
         Some(Self { _lock: lock })
     }
 
-    /// What has become of it so far; to be asked once.
+    /// The outcome so far; takes the panic out, so call it once.
     pub fn outcome(&self) -> Outcome {
         with_state(|state| Outcome {
             failed: state.failed,
@@ -87,7 +87,7 @@ impl<'lock> Plugged<'lock> {
         .expect("plugged in")
     }
 
-    /// Whether the solve is to stop, because it cannot go on with this linear solver.
+    /// Whether the solve must stop because it cannot continue with this linear solver.
     pub fn has_failed() -> bool {
         with_state(|state| state.failed || state.panic.is_some()).unwrap_or(false)
     }
@@ -105,7 +105,7 @@ fn with_state<R>(use_it: impl FnOnce(&mut State) -> R) -> Option<R> {
 
 /// The blocks of the matrix under each of Ipopt's three treatments of fixed variables: taken out (`make_parameter`, the default), left in
 /// with relaxed bounds (`relax_bounds`, what the first becomes when there are more equations than free variables), and left in with an
-/// equation each (`make_constraint`). The order of the matrix tells which one it is.
+/// equation each (`make_constraint`). The order of the matrix determines which one is in effect.
 fn layouts(layout: &ProblemLayout) -> Vec<kkt::Layout> {
     let equal = |lower: &[f64], upper: &[f64]| lower.iter().zip(upper).filter(|(a, b)| a == b).count();
     let fixed = equal(&layout.variable_lower, &layout.variable_upper);
@@ -118,7 +118,7 @@ fn layouts(layout: &ProblemLayout) -> Vec<kkt::Layout> {
     ]
 }
 
-/// Runs one of the functions below, and returns what `info(1)` is to say. No panic leaves it; after one, and after a failure, nothing is done any more.
+/// Runs one of the functions below, and returns the value of `info(1)`. No panic leaves it; after a panic or a failure it does nothing.
 fn guarded(work: impl FnOnce(&mut State) -> c_int) -> c_int {
     let done = with_state(|state| {
         if state.failed || state.panic.is_some() {
@@ -140,7 +140,7 @@ fn guarded(work: impl FnOnce(&mut State) -> c_int) -> c_int {
 
 // What all the functions below rely on: Ipopt passes the arrays of MA57's documentation, of which `keep` and `ifact` have at least one
 // number, `info` has 40, `cntl` 5 and `icntl` 20; it passes the same `keep` to analysis and factorization, the same `ifact` to factorization
-// and solve; nothing else uses the arrays meanwhile.
+// and solve; nothing else uses the arrays in the meantime.
 
 unsafe extern "C" fn initialize(cntl: *mut f64, icntl: *mut c_int) {
     // SAFETY: see above.
@@ -268,7 +268,7 @@ unsafe extern "C" fn solve(
     });
 }
 
-/// Never called: no array is ever too short.
+/// Never called, because no array is ever too short.
 unsafe extern "C" fn enlarge(
     _n: *mut c_int,
     _ic: *mut c_int,
@@ -285,7 +285,7 @@ unsafe extern "C" fn enlarge(
 ) {
 }
 
-/// The matrix that an analysis has put at this position, counted from one.
+/// The matrix of an analysis, by its position counted from one.
 fn matrix(state: &mut State, keep: c_int) -> Option<&mut Kkt> {
     state.matrices.get_mut(usize::try_from(keep).ok()?.checked_sub(1)?)
 }

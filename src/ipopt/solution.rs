@@ -1,4 +1,4 @@
-//! What comes out of a solve.
+//! The result of a solve.
 
 use std::fmt;
 
@@ -76,7 +76,7 @@ pub struct Solution {
     pub upper_multipliers: Vec<f64>,
     /// How it ended.
     pub status: Status,
-    /// Faer or MUMPS, whichever came last.
+    /// Faer or MUMPS, whichever was used last.
     pub linear_solver: LinearSolver,
     /// Every iteration, from the initial point on.
     pub history: Vec<IterationRecord>,
@@ -112,7 +112,7 @@ pub enum Status {
     Infeasible,
     /// The search direction became too small.
     StepTooSmall,
-    /// The iterates run away to infinity.
+    /// The iterates diverge.
     Diverging,
     /// The limit of iterations was reached.
     MaxIterations,
@@ -130,9 +130,9 @@ pub enum Status {
     Interrupted,
     /// More equations than free variables.
     TooFewDegreesOfFreedom,
-    /// Ipopt holds the problem to be wrong.
+    /// Ipopt considers the problem invalid.
     InvalidProblem,
-    /// Ipopt holds an option to be wrong, for example a linear solver that is not installed.
+    /// Ipopt considers an option invalid, for example a linear solver that is not installed.
     InvalidOption,
     /// NaN or infinity where Ipopt could not step around it.
     InvalidNumber,
@@ -146,7 +146,7 @@ pub enum Status {
 const MAXIMUM_WALL_TIME_EXCEEDED: ffi::ApplicationReturnStatus = -5;
 
 impl Status {
-    /// From what `IpoptSolve` returned. A stop that was asked for counts as asked for by the callback.
+    /// From the return code of `IpoptSolve`. A requested stop counts as requested by the callback.
     pub(super) fn from_code(code: ffi::ApplicationReturnStatus) -> Self {
         match code {
             ffi::Solve_Succeeded => Self::Solved,
