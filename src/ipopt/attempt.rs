@@ -22,8 +22,6 @@ const DEFAULT_MAX_ITER: i32 = 3000;
 pub(super) struct Attempt<'a> {
     pub options: &'a Options,
     pub layout: &'a ProblemLayout,
-    /// Whether the multipliers count.
-    pub warm: bool,
     pub lock: &'a SolverLock,
 }
 
@@ -51,16 +49,15 @@ impl Attempt<'_> {
         self,
         session: &mut Session<'_, P>,
         x: Vec<f64>,
-        multipliers: Multipliers,
         linear_solver: LinearSolver,
     ) -> Result<Ended, IpoptError> {
-        let Self { options, layout, warm, lock } = self;
+        let Self { options, layout, lock } = self;
         let mut application = Application::new(layout, callbacks::<P>(), lock)?;
         let plugged = match linear_solver {
             LinearSolver::Faer => Some(Plugged::new(layout, lock).ok_or(IpoptError::NoFaer)?),
             _ => None,
         };
-        options.apply(&mut application, linear_solver, layout.hessian.is_some(), warm)?;
+        options.apply(&mut application, linear_solver, layout.hessian.is_some())?;
         if session.num_before > 0 {
             let limit = match options.get("max_iter") {
                 Some(OptionValue::Int(limit)) => *limit,
@@ -73,7 +70,7 @@ impl Attempt<'_> {
             constraints: vec![f64::NAN; layout.num_constraints],
             objective: f64::NAN,
             x,
-            multipliers,
+            multipliers: Multipliers::zeros(layout.num_variables, layout.num_constraints),
         };
         // SAFETY: the callbacks are those for a `Session<P>`, which is borrowed by nothing else until the call returns.
         let code = unsafe { application.solve(&mut iterate, std::ptr::from_mut(session).cast()) };

@@ -45,11 +45,10 @@ fn probe(problem: &mut impl NlpProblem, linear_solver: LinearSolver, lock: &Solv
     let mut solved = || {
         let layout = ProblemLayout::of(problem)?;
         let x = layout.initial_point(problem)?;
-        let multipliers = layout.initial_multipliers(None)?;
         let mut on_iteration = |_: &IterationRecord, _: &[f64]| ControlFlow::Continue(());
         let mut session = Session::new(problem, &mut on_iteration, &layout, &x);
-        let attempt = Attempt { options: &Options::new(), layout: &layout, warm: false, lock };
-        let ended = attempt.run(&mut session, x, multipliers, linear_solver)?;
+        let attempt = Attempt { options: &Options::new(), layout: &layout, lock };
+        let ended = attempt.run(&mut session, x, linear_solver)?;
         let used = ended.plug.is_some_and(|outcome| outcome.used);
         Ok::<bool, IpoptError>(ended.code == ffi::Solve_Succeeded && used)
     };

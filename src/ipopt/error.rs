@@ -56,7 +56,7 @@ pub enum IpoptError {
         /// The upper bound.
         upper: f64,
     },
-    /// A value of the initial point, or of the multipliers to start from, is not finite.
+    /// A value of the initial point is not finite.
     #[error("the initial {what} {index} is {value}, not a finite number")]
     NotFinite {
         /// Of what.
@@ -65,16 +65,6 @@ pub enum IpoptError {
         index: usize,
         /// Its value.
         value: f64,
-    },
-    /// Multipliers to start from that belong to a problem of another size.
-    #[error("there are {actual} initial {what}s, but the problem needs {expected}")]
-    MultiplierCount {
-        /// Of what.
-        what: &'static str,
-        /// How many there must be.
-        expected: usize,
-        /// How many there are.
-        actual: usize,
     },
     /// Ipopt has no such option, or it does not take such a value.
     #[error(

@@ -2,7 +2,6 @@
 
 use super::error::IpoptError;
 use super::problem::NlpProblem;
-use super::solution::Multipliers;
 
 /// Ipopt treats a bound beyond ±1e19 as no bound.
 const NO_BOUND: f64 = 2e19;
@@ -73,28 +72,6 @@ impl ProblemLayout {
         problem.initial_point(&mut x);
         finite("variable", &x)?;
         Ok(x)
-    }
-
-    /// The initial multipliers: the given ones, or zeros, which Ipopt then ignores.
-    ///
-    /// # Errors
-    /// When they have the wrong length or are not finite.
-    pub fn initial_multipliers(&self, given: Option<&Multipliers>) -> Result<Multipliers, IpoptError> {
-        let (n, m) = (self.num_variables, self.num_constraints);
-        let Some(given) = given else {
-            return Ok(Multipliers { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] });
-        };
-        for (what, expected, values) in [
-            ("constraint multiplier", m, &given.constraint),
-            ("lower bound multiplier", n, &given.lower),
-            ("upper bound multiplier", n, &given.upper),
-        ] {
-            if values.len() != expected {
-                return Err(IpoptError::MultiplierCount { what, expected, actual: values.len() });
-            }
-            finite(what, values)?;
-        }
-        Ok(given.clone())
     }
 
     /// By how much g (m,) lies outside its bounds, max norm; NaN if an entry is.

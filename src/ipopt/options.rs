@@ -22,8 +22,7 @@ const RESERVED: [&str; 5] = [
 /// ```
 ///
 /// Where they differ from Ipopt's defaults: silent (`print_level` 0, `sb` yes), `check_derivatives_for_naninf` yes,
-/// `hessian_approximation` by whether the problem has a Hessian, `warm_start_init_point` by whether
-/// multipliers are given. All of these can be set; `option_file_name`, `nlp_…_bound_inf`, `linear_system_scaling` and `linear_solver` (see
+/// `hessian_approximation` by whether the problem has a Hessian. All of these can be set; `option_file_name`, `nlp_…_bound_inf`, `linear_system_scaling` and `linear_solver` (see
 /// [`Options::linear_solver`]) cannot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -83,7 +82,6 @@ impl Options {
         application: &mut Application,
         linear_solver: LinearSolver,
         has_hessian: bool,
-        warm_start: bool,
     ) -> Result<(), IpoptError> {
         let wants_exact = self.get("hessian_approximation") == Some(&OptionValue::Str("exact".into()));
         if wants_exact && !has_hessian {
@@ -95,7 +93,6 @@ impl Options {
         let defaults = Self::new()
             .set_str("check_derivatives_for_naninf", "yes")
             .set_str("hessian_approximation", if has_hessian { "exact" } else { "limited-memory" })
-            .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" })
             .set_str("linear_system_scaling", "none");
         let defaults = match linear_solver {
             LinearSolver::Faer => with_plug(defaults),

@@ -47,15 +47,22 @@ pub struct IterationRecord {
     pub seconds: f64,
 }
 
-/// Multipliers of a problem with n variables and m constraints, to start from.
+/// Multipliers of a problem with n variables and m constraints.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Multipliers {
+pub(super) struct Multipliers {
     /// (m,) of the constraints.
     pub constraint: Vec<f64>,
     /// (n,) of the lower bounds of the variables, ≥ 0.
     pub lower: Vec<f64>,
     /// (n,) of the upper bounds of the variables, ≥ 0.
     pub upper: Vec<f64>,
+}
+
+impl Multipliers {
+    /// All zero.
+    pub(super) fn zeros(n: usize, m: usize) -> Self {
+        Self { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] }
+    }
 }
 
 /// The result of a solve.
@@ -84,18 +91,6 @@ pub struct Solution {
     pub evaluation_seconds: f64,
     /// s in all, wall clock, without waiting for another thread's solve.
     pub total_seconds: f64,
-}
-
-impl Solution {
-    /// The multipliers, to start another solve from.
-    #[must_use]
-    pub fn multipliers(&self) -> Multipliers {
-        Multipliers {
-            constraint: self.constraint_multipliers.clone(),
-            lower: self.lower_multipliers.clone(),
-            upper: self.upper_multipliers.clone(),
-        }
-    }
 }
 
 /// How a solve ended.

@@ -12,40 +12,35 @@ use super::linear_solver::LinearSolver;
 use super::lock::SolverLock;
 use super::options::Options;
 use super::problem::{NlpProblem, OnIteration};
-use super::solution::{Multipliers, Solution, Status};
+use super::solution::{Solution, Status};
 
 /// Solves the problem with Ipopt. Waits first if another thread is solving.
 ///
-/// `warm_start` gives multipliers to start from (they count together with `warm_start_init_point`, which is then set; the
-/// `warm_start_…_push` options say how far the point may stay at its bounds). `on_iteration` is called at every iteration.
-///
-/// When faer fails, the solve continues with MUMPS from the last iterate.
+/// `on_iteration` is called at every iteration. When faer fails, the solve continues with MUMPS from the last iterate.
 ///
 /// # Errors
-/// When the problem, its initial point, the multipliers or the options are wrong; then nothing was solved.
+/// When the problem, its initial point or the options are wrong; then nothing was solved.
 ///
 /// # Panics
 /// When the problem or `on_iteration` panics: with the same payload, after Ipopt has cleaned up.
 pub fn solve<P: NlpProblem>(
     problem: &mut P,
     options: &Options,
-    warm_start: Option<&Multipliers>,
     on_iteration: &mut OnIteration<'_>,
 ) -> Result<Solution, IpoptError> {
     let layout = ProblemLayout::of(problem)?;
     let x = layout.initial_point(problem)?;
-    let multipliers = layout.initial_multipliers(warm_start)?;
     let lock = SolverLock::acquire()?;
     let mut linear_solver = options.linear_solver.resolve(&lock)?;
 
     let start = Instant::now();
     let mut session = Session::new(problem, on_iteration, &layout, &x);
-    let attempt = Attempt { options, layout: &layout, warm: warm_start.is_some(), lock: &lock };
-    let mut ended = attempt.run(&mut session, x, multipliers, linear_solver)?;
+    let attempt = Attempt { options, layout: &layout, lock: &lock };
+    let mut ended = attempt.run(&mut session, x, linear_solver)?;
     if session.stop.is_none() && ended.linear_solver_failed() {
         linear_solver = LinearSolver::Mumps;
-        let (x, multipliers) = (session.continue_anew(), layout.initial_multipliers(None)?);
-        ended = Attempt { warm: false, ..attempt }.run(&mut session, x, multipliers, linear_solver)?;
+        let x = session.continue_anew();
+        ended = attempt.run(&mut session, x, linear_solver)?;
     }
     let total_seconds = start.elapsed().as_secs_f64();
 

@@ -73,7 +73,7 @@ fn the_flag_interrupts() {
 #[ignore = "run by the_flag_interrupts"]
 fn interrupt_by_flag() {
     let mut seen = Vec::new();
-    let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+    let solution = solve(&mut Hs071::new(true), &Options::new(), &mut |record, x| {
         seen = x.to_vec();
         if record.iteration == 4 {
             assert!(!INTERRUPT.raise());
@@ -134,7 +134,7 @@ fn solve_slowly() {
     install_ctrl_c().unwrap();
     let mut problem = Hs071::new(true);
     problem.on_call = Box::new(|_| thread::sleep(Duration::from_millis(100)));
-    let solution = solve(&mut problem, &Options::new(), None, &mut |_, _| {
+    let solution = solve(&mut problem, &Options::new(), &mut |_, _| {
         println!("solving");
         ControlFlow::Continue(())
     });
