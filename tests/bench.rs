@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::process::Command;
 
-use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
 fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(cargo_bin("warpgait")).current_dir(folder).args(arguments).output().unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_warpgait")).current_dir(folder).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -118,7 +118,7 @@ fn awaited<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
 fn a_case_ends_with_its_sweep() {
     for signal in ["TERM", "KILL"] {
         let folder = tempfile::tempdir().unwrap();
-        let mut sweep = Command::new(cargo_bin("warpgait"))
+        let mut sweep = Command::new(env!("CARGO_BIN_EXE_warpgait"))
             .current_dir(folder.path())
             // A map that takes seconds on any machine.
             .args(["bench", "fig4", "--level", "hard", "--terrain", "pit", "--quiet"])

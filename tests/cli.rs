@@ -1,14 +1,14 @@
 //! The command line: exit codes, one message, no incomplete files.
 
 use std::path::Path;
+use std::process::Command;
 
 use crate::common;
-use assert_cmd::Command;
 use serde_json::Value;
 
 fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
     let output =
-        Command::cargo_bin("warpgait").unwrap().current_dir(folder).args(arguments).output().unwrap();
+        Command::new(env!("CARGO_BIN_EXE_warpgait")).current_dir(folder).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
@@ -268,7 +268,7 @@ fn solve_writes_a_plan_that_checks() {
 fn an_interrupted_solve_writes_what_it_has() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("flat.toml"), FLAT).unwrap();
-    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("warpgait"))
+    let mut child = Command::new(env!("CARGO_BIN_EXE_warpgait"))
         .current_dir(folder.path())
         // With a tolerance that cannot be met, the solve lasts until it is interrupted.
         .args(["solve", "flat.toml", "--quiet", "--set", "solver.tolerance=1e-12", "--set", "horizon=30"])
@@ -276,8 +276,8 @@ fn an_interrupted_solve_writes_what_it_has() {
         .spawn()
         .unwrap();
     std::thread::sleep(std::time::Duration::from_secs(3));
-    let id = child.id().to_string();
-    assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let plan = warpgait::plan::Plan::read(&folder.path().join("flat.plan.npz")).unwrap();
     assert!(!plan.meta.solver.success && plan.meta.scenario.contains("max_iterations"));

@@ -1,8 +1,8 @@
 //! The guarantees of every method on small grids, and the messages where they fail.
 
 use std::ops::ControlFlow;
+use std::process::Command;
 
-use assert_cmd::Command;
 use warpgait::Error;
 use warpgait::heightfield::Heightfield;
 use warpgait::scenario::{MapMethod, MapScale, MapSpec};
@@ -196,7 +196,7 @@ fn no_motion_is_planned_over_a_folded_map() {
         [goal]\nposition = [-1.8, 0.0]\n[map]\nmethod = \"dirichlet\"\ncells = [16, 16, 8]\n";
     std::fs::write(folder.path().join("s.toml"), scenario).unwrap();
     let run = |arguments: &[&str]| {
-        let mut command = Command::cargo_bin("warpgait").unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_warpgait"));
         let output = command.current_dir(folder.path()).env("WARPGAIT_CACHE", folder.path().join("cache"));
         let output = output.args(arguments).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
