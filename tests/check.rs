@@ -44,7 +44,7 @@ fn laws_of_motion() {
         broken(standing(), |p| p.foot_force[4 * 100][2] += 0.04 * WEIGHT),
         ["newton_max", "euler_max"]
     );
-    // Weight on the front feet, the centre of mass between all four.
+    // Weight on the front feet, the center of mass between all four.
     let front_heavy = |p: &mut Plan| {
         for (i, force) in p.foot_force.iter_mut().enumerate() {
             force[2] += if i % 4 < 2 { 0.02 } else { -0.02 } * WEIGHT;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct StartSpec {
     /// x, y of the base, m.
     pub position: [f64; 2],
-    /// Heading, rad; default: towards the goal.
+    /// Heading, rad; default: toward the goal.
     pub yaw: Option<f64>,
 }
 

@@ -78,7 +78,7 @@ impl Default for Domain {
 pub enum Level {
     /// Gentle.
     Easy,
-    /// As in the paper, as far as its figures show.
+    /// As in the paper, judging by its figures.
     #[default]
     Medium,
     /// Steep.

@@ -14,7 +14,7 @@ pub fn go_on(_: &IterationRecord, _: &[f64]) -> ControlFlow<()> {
 }
 
 /// Hock and Schittkowski, problem 71:
-/// minimise x₀x₃(x₀ + x₁ + x₂) + x₂ subject to x₀x₁x₂x₃ ≥ 25, ‖x‖² = 40, 1 ≤ xᵢ ≤ 5.
+/// minimize x₀x₃(x₀ + x₁ + x₂) + x₂ subject to x₀x₁x₂x₃ ≥ 25, ‖x‖² = 40, 1 ≤ xᵢ ≤ 5.
 pub struct Hs071 {
     /// Whether Ipopt gets the exact Hessian.
     pub with_hessian: bool,
@@ -227,7 +227,7 @@ impl NlpProblem for Unconstrained {
     }
 }
 
-/// minimise Σᵢ (sin(i + 3xᵢ) + (xᵢ − aᵢ)²/5) subject to xᵢ xᵢ₊₁ + sin(2xᵢ) = bᵢ for i < n/2 and |xᵢ| ≤ 4, where a and b
+/// minimize Σᵢ (sin(i + 3xᵢ) + (xᵢ − aᵢ)²/5) subject to xᵢ xᵢ₊₁ + sin(2xᵢ) = bᵢ for i < n/2 and |xᵢ| ≤ 4, where a and b
 /// are pseudo-random: not convex, and not always feasible.
 ///
 /// Counts how often `new_x` was false although x was not the one of the call before.
