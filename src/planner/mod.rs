@@ -3,8 +3,8 @@
 //! | file | holds |
 //! | --- | --- |
 //! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
-//! | [`guess`] | where a solve starts |
-//! | [`solve`] | the sequence of stages, and one stage |
+//! | [`mod@guess`] | where a solve starts |
+//! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | [`stage`] | which stages there are |
 //! | `stopping` | when a stage has done what its effort demands |
 //! | `options` | the options given to Ipopt |
