@@ -100,10 +100,10 @@ impl Prepared {
     /// # Errors
     /// For input that is wrong or files that cannot be read.
     pub fn new(loaded: &LoadedScenario, observer: &mut Observer) -> Result<Self> {
-        // A request to stop takes effect at the first iteration.
-        let _ = observer(&Event::Step(Step::Terrain));
         let scenario = &loaded.scenario;
         let gait = Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
+        // A request to stop takes effect at the first iteration.
+        let _ = observer(&Event::Step(Step::Terrain));
         let ground = terrain::build(&scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
         loaded.ensure_inside(ground.field.extent())?;
         for note in &ground.report.notes {

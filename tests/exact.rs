@@ -105,7 +105,7 @@ fn splines_that_do_not_fit_together_are_refused() {
         (|plan| splines(plan, "base_knots").2[7] += 0.01, "not uniform"),
         (|plan| splines(plan, "base_knots").2.fill(f64::NAN), "not uniform"),
         (|plan| splines(plan, "RH_force_nodes").1[0] -= 1, "123 values for the shape [40, 3]"),
-        (|plan| splines(plan, "RH_force_nodes").1 = vec![123, 1], "the phases ask for [41, 3]"),
+        (|plan| splines(plan, "RH_force_nodes").1 = vec![123, 1], "the phases require [41, 3]"),
         (|plan| splines(plan, "RH_force_nodes").2.fill(1.0), "where the foot moves"),
         (|plan| plan.phase_durations[1].truncate(2), "phase_durations of RF: 2 phases"),
         (|plan| plan.phase_durations[1][0] += 0.02, "phase_durations of RF: a switch"),

@@ -37,7 +37,7 @@ impl Plan {
             );
         }
 
-        let warped = if npz.has("warped_foot_position") { Some(read_warped(&mut npz, n, e)?) } else { None };
+        let warped = read_warped(&mut npz, n, e)?;
 
         let (shape, history_objective) = npz.finite_f64("history_objective")?;
         let iterations = history_objective.len();
@@ -158,9 +158,14 @@ fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
     })
 }
 
-/// The warped samples; those of the base are missing where it was planned in ambient space.
-fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<WarpedSamples> {
-    let base = if npz.has("warped_base_position") {
+/// The warped samples, if there are any; those of the base are absent where it was planned in ambient space.
+fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<Option<WarpedSamples>> {
+    let of_base = ["warped_base_position", "warped_base_euler"].iter().any(|name| npz.has(name));
+    let of_feet = ["warped_foot_position", "warped_foot_force"].iter().any(|name| npz.has(name));
+    if !(of_base || of_feet) {
+        return Ok(None);
+    }
+    let base = if of_base {
         Some(WarpedBase {
             position: npz.points("warped_base_position", &[n])?,
             euler: npz.points("warped_base_euler", &[n])?,
@@ -168,11 +173,11 @@ fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<WarpedSamples>
     } else {
         None
     };
-    Ok(WarpedSamples {
+    Ok(Some(WarpedSamples {
         base,
         foot_position: npz.points("warped_foot_position", &[n, e])?,
         foot_force: npz.points("warped_foot_force", &[n, e])?,
-    })
+    }))
 }
 
 fn read_map(npz: &mut NpzReader) -> Result<MapGrid> {
