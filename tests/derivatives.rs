@@ -185,7 +185,7 @@ fn coarse_knots_and_newton_euler_match_differences() {
     }
 }
 
-/// Of a robot with known legs: joint speeds, torques and clearance of the knees besides.
+/// For a robot with known legs: joint speeds, torques and knee clearance as well.
 #[test]
 fn blocks_of_known_legs_match_differences_on_all_terrains() {
     for formulation in ["warped", "direct", "hybrid"] {
@@ -202,7 +202,7 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
     }
 }
 
-/// Two threads say what one says, sums in another order apart, and the same bits each time.
+/// Two threads add what one adds, up to the order of sums, and the same bits each time.
 #[test]
 fn two_threads_evaluate_what_one_does() {
     let durations = "[gait]\ncycle = 0.8\noptimize_durations = true\n";

@@ -56,7 +56,7 @@ fn matrix(n: usize, inequalities: usize, equations: usize, kind: Kind, random: &
         if i > 0 && kind.coupling > 0.0 {
             let (value, j) = (kind.coupling * random.number(), random.below(i));
             // Ipopt's triangle, or the other one.
-            if random.bits() % 2 == 0 { matrix.add(i, j, value) } else { matrix.add(j, i, value) }
+            if random.bits().is_multiple_of(2) { matrix.add(i, j, value) } else { matrix.add(j, i, value) }
         }
     }
     let mut rows: Vec<Vec<(usize, f64)>> = Vec::new();

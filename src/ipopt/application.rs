@@ -5,9 +5,11 @@ use std::ptr::{NonNull, null_mut};
 
 use ipopt_sys as ffi;
 
-use super::layout::Layout;
+use super::error::IpoptError;
+use super::layout::ProblemLayout;
 use super::lock::SolverLock;
-use super::{IpoptError, Multipliers, OptionValue};
+use super::option_value::OptionValue;
+use super::solution::Multipliers;
 
 /// The functions that Ipopt calls, all with the same kind of user data.
 pub struct Callbacks {
@@ -39,11 +41,15 @@ impl<'lock> Application<'lock> {
     /// A problem with these sizes and bounds, silent, with Ipopt's default options.
     ///
     /// # Errors
-    /// [`IpoptError::Refused`], which the checks of [`Layout`] should make impossible.
-    pub fn new(layout: &Layout, callbacks: Callbacks, lock: &'lock SolverLock) -> Result<Self, IpoptError> {
+    /// [`IpoptError::Refused`], which the checks of [`ProblemLayout`] should make impossible.
+    pub fn new(
+        layout: &ProblemLayout,
+        callbacks: Callbacks,
+        lock: &'lock SolverLock,
+    ) -> Result<Self, IpoptError> {
         const INDICES_FROM_ZERO: ffi::Index = 0;
         // SAFETY: the bounds are n and m numbers long; Ipopt copies them and does not write to them. Their counts, and
-        // those of the entries, fit into 32 bits (checked by `Layout`).
+        // those of the entries, fit into 32 bits (checked by `ProblemLayout`).
         let problem = unsafe {
             ffi::CreateIpoptProblem(
                 layout.num_variables as ffi::Index,
@@ -78,10 +84,10 @@ impl<'lock> Application<'lock> {
         }
     }
 
-    /// Turns off every output and the option file. Says whether Ipopt accepted that.
+    /// Turns off every output and the option file. Returns whether Ipopt accepted that.
     ///
-    /// A fresh Ipopt prints what it thinks of a wrong option, for its print level takes effect only when a solve
-    /// begins. So one is begun here without a point to start from, which Ipopt declines after it has read its options.
+    /// A fresh Ipopt prints a message about a wrong option, because its print level takes effect only when a solve begins. So a solve
+    /// is started here without an initial point, which Ipopt declines after it has read its options.
     fn silence(&mut self) -> bool {
         let accepted = [
             ("print_level", OptionValue::Int(0)),

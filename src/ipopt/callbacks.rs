@@ -1,7 +1,7 @@
-//! The functions that Ipopt calls during a solve, and the session that they share.
+//! The functions that Ipopt calls during a solve, and their common session.
 //!
 //! No panic may cross C++, so every call into the problem is caught. After a panic the outputs are zeros and the
-//! problem is not asked again, until the next iteration's callback stops the solve. (Returning "failed" instead
+//! problem is not called again, until the next iteration's callback stops the solve. (Returning "failed" instead
 //! would make Ipopt try shorter and shorter steps.)
 
 use std::any::Any;
@@ -14,13 +14,15 @@ use std::time::{Duration, Instant};
 use ipopt_sys as ffi;
 
 use super::application::Callbacks;
-use super::layout::{Layout, Structure};
+use super::interrupt::INTERRUPT;
+use super::layout::{ProblemLayout, Structure};
 use super::plug::Plugged;
-use super::{INTERRUPT, IterationRecord, Mode, NlpProblem, OnIteration};
+use super::problem::{NlpProblem, OnIteration};
+use super::solution::{IterationRecord, Mode};
 
-/// Why a solve is to stop.
+/// Why a solve must stop.
 pub enum Stop {
-    /// `on_iteration` said so.
+    /// `on_iteration` returned `Break`.
     Callback,
     /// [`INTERRUPT`] was raised.
     Interrupt,
@@ -32,11 +34,11 @@ pub enum Stop {
 pub struct Session<'a, P> {
     problem: &'a mut P,
     on_iteration: &'a mut OnIteration<'a>,
-    layout: &'a Layout,
+    layout: &'a ProblemLayout,
     started: Instant,
     /// Time inside the problem's functions.
     pub evaluation_time: Duration,
-    /// The last point at which the constraints were evaluated. (Ipopt 3.11 does not tell the current iterate.)
+    /// The last point at which the constraints were evaluated. (Ipopt 3.11 does not expose the current iterate.)
     pub last_x: Vec<f64>,
     /// g at that point.
     pub last_constraints: Vec<f64>,
@@ -46,7 +48,7 @@ pub struct Session<'a, P> {
     pub num_before: usize,
     /// The iterations so far.
     pub history: Vec<IterationRecord>,
-    /// Why to stop, once that is decided.
+    /// Why to stop, once there is a reason.
     pub stop: Option<Stop>,
 }
 
@@ -55,7 +57,7 @@ impl<'a, P: NlpProblem> Session<'a, P> {
     pub fn new(
         problem: &'a mut P,
         on_iteration: &'a mut OnIteration<'a>,
-        layout: &'a Layout,
+        layout: &'a ProblemLayout,
         x: &[f64],
     ) -> Self {
         Self {
@@ -79,7 +81,7 @@ impl<'a, P: NlpProblem> Session<'a, P> {
         self.shown_x.clone()
     }
 
-    /// Lets the problem fill `out`, in measured time; with zeros after a panic.
+    /// Lets the problem fill `out` and measures the time; fills in zeros after a panic.
     fn evaluate(&mut self, out: &mut [f64], fill: impl FnOnce(&mut P, &mut [f64])) {
         if !matches!(self.stop, Some(Stop::Panic(_))) {
             let start = Instant::now();
@@ -93,12 +95,12 @@ impl<'a, P: NlpProblem> Session<'a, P> {
         out.fill(0.0);
     }
 
-    /// Remembers the iteration, tells `on_iteration`, and says whether to go on.
+    /// Records the iteration, calls `on_iteration`, and returns whether to continue.
     fn iterate(&mut self, mut record: IterationRecord) -> bool {
         if Plugged::has_failed() {
             return false;
         }
-        // The point from which a run goes on has its record.
+        // The point from which a second run continues already has its record.
         let is_known = record.iteration == 0 && !self.history.is_empty();
         record.iteration += self.num_before;
         if self.stop.is_none() && !is_known {
@@ -129,13 +131,13 @@ pub fn callbacks<P: NlpProblem>() -> Callbacks {
 }
 
 // What all the functions below rely on: Ipopt passes on the user data that `solve` gave it, a `Session<P>` that nothing
-// else uses meanwhile; it calls from one thread, one call at a time; its arrays have the lengths that `CreateIpoptProblem`
+// else uses in the meantime; it calls from one thread, one call at a time; its arrays have the lengths that `CreateIpoptProblem`
 // was told, which are those in the session's layout; inputs and outputs are different arrays.
 
 /// The session.
 ///
 /// # Safety
-/// As said above; the result must be gone when the callback returns.
+/// See above; the result must not outlive the callback.
 unsafe fn session<'s, 'a: 's, P>(user_data: *mut c_void) -> &'s mut Session<'a, P> {
     // SAFETY: see above.
     unsafe { &mut *user_data.cast::<Session<'a, P>>() }
@@ -144,7 +146,7 @@ unsafe fn session<'s, 'a: 's, P>(user_data: *mut c_void) -> &'s mut Session<'a, 
 /// An array that Ipopt has filled. It may be null when it is empty.
 ///
 /// # Safety
-/// As said above.
+/// See above.
 unsafe fn input<'s>(start: *const ffi::Number, len: usize) -> &'s [f64] {
     if len == 0 {
         return &[];
@@ -153,10 +155,10 @@ unsafe fn input<'s>(start: *const ffi::Number, len: usize) -> &'s [f64] {
     unsafe { slice::from_raw_parts(start, len) }
 }
 
-/// An array for results, filled with NaN: Ipopt does not initialise it, and entries that the problem forgets are noticed.
+/// An array for results, filled with NaN: Ipopt does not initialize it, and entries that the problem forgets are noticed.
 ///
 /// # Safety
-/// As said above.
+/// See above.
 unsafe fn output<'s>(start: *mut ffi::Number, len: usize) -> &'s mut [f64] {
     if len == 0 {
         return &mut [];
@@ -173,7 +175,7 @@ unsafe fn output<'s>(start: *mut ffi::Number, len: usize) -> &'s mut [f64] {
 /// Writes a sparsity structure into Ipopt's arrays.
 ///
 /// # Safety
-/// As said above.
+/// See above.
 unsafe fn write_structure(structure: &Structure, rows: *mut ffi::Index, columns: *mut ffi::Index) {
     for (index, (&row, &column)) in structure.rows.iter().zip(&structure.columns).enumerate() {
         // SAFETY: both arrays are as long as the structure.

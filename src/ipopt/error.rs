@@ -1,6 +1,6 @@
-//! What is found wrong before a solve.
+//! Mistakes that are found before a solve.
 
-use super::OptionValue;
+use super::option_value::OptionValue;
 
 /// A mistake in the problem, the options or the use of the solver, found before the solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,7 +56,7 @@ pub enum IpoptError {
         /// The upper bound.
         upper: f64,
     },
-    /// A value of the initial point, or of the multipliers to start from, is not finite.
+    /// A value of the initial point is not finite.
     #[error("the initial {what} {index} is {value}, not a finite number")]
     NotFinite {
         /// Of what.
@@ -65,16 +65,6 @@ pub enum IpoptError {
         index: usize,
         /// Its value.
         value: f64,
-    },
-    /// Multipliers to start from that belong to a problem of another size.
-    #[error("there are {actual} initial {what}s, but the problem needs {expected}")]
-    MultiplierCount {
-        /// Of what.
-        what: &'static str,
-        /// How many there must be.
-        expected: usize,
-        /// How many there are.
-        actual: usize,
     },
     /// Ipopt has no such option, or it does not take such a value.
     #[error(
@@ -93,9 +83,9 @@ pub enum IpoptError {
     /// `hessian_approximation = exact` without a Hessian.
     #[error("hessian_approximation = exact, but the problem has no Hessian")]
     NoHessian,
-    /// `linear_solver = "faer"` with an Ipopt that cannot take it.
+    /// `linear_solver = "faer"` with an Ipopt that cannot use it.
     #[error(
-        "linear_solver = \"faer\", but this Ipopt cannot take it: it has no function to set MA57's routines \
+        "linear_solver = \"faer\", but this Ipopt cannot use it: it has no function that sets MA57's routines \
          (Ipopt 3.11 to 3.14 built with the linear solver loader have one); use \"auto\" or \"mumps\""
     )]
     NoFaer,

@@ -3,30 +3,30 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::IpoptError;
+use super::error::IpoptError;
 
 /// A program that ends because of SIGINT has this exit code: 128 + 2.
 const EXIT_CODE: i32 = 130;
 
-/// A wish to stop, raised by anyone, seen by the running solve at its next iteration.
+/// A request to stop, raised by anyone and noticed by the running solve at its next iteration.
 #[derive(Debug, Default)]
 pub struct InterruptFlag(AtomicBool);
 
-/// The flag that [`super::solve`] looks at. It stays raised, and stops later solves as well, until it is lowered.
+/// The flag that [`super::solve`] polls. It stays raised, and stops later solves as well, until it is lowered.
 pub static INTERRUPT: InterruptFlag = InterruptFlag(AtomicBool::new(false));
 
 impl InterruptFlag {
-    /// Asks to stop; says whether that had been asked before.
+    /// Requests a stop; returns whether one had been requested before.
     pub fn raise(&self) -> bool {
         self.0.swap(true, Ordering::SeqCst)
     }
 
-    /// Withdraws the wish.
+    /// Withdraws the request.
     pub fn lower(&self) {
         self.0.store(false, Ordering::SeqCst);
     }
 
-    /// Whether someone wishes to stop.
+    /// Whether a stop is requested.
     pub fn is_raised(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }

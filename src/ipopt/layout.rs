@@ -1,8 +1,9 @@
 //! The fixed part of a problem: sizes, bounds and sparsity, read once and checked.
 
-use super::{IpoptError, Multipliers, NlpProblem};
+use super::error::IpoptError;
+use super::problem::NlpProblem;
 
-/// Beyond ±1e19 Ipopt takes a bound for none.
+/// Ipopt treats a bound beyond ±1e19 as no bound.
 const NO_BOUND: f64 = 2e19;
 
 /// Rows and columns of the entries of a sparse matrix, 0-based.
@@ -19,9 +20,9 @@ impl Structure {
     }
 }
 
-/// Sizes, bounds and sparsity of a problem that Ipopt can take.
+/// Sizes, bounds and sparsity of a problem that Ipopt can solve.
 #[derive(Debug)]
-pub struct Layout {
+pub struct ProblemLayout {
     pub num_variables: usize,
     pub num_constraints: usize,
     pub variable_lower: Vec<f64>,
@@ -32,8 +33,8 @@ pub struct Layout {
     pub hessian: Option<Structure>,
 }
 
-impl Layout {
-    /// Asks the problem, and checks what it says.
+impl ProblemLayout {
+    /// Queries the problem and checks its answers.
     ///
     /// # Errors
     /// The first thing that is wrong.
@@ -62,7 +63,7 @@ impl Layout {
         })
     }
 
-    /// The point to start from, (n,).
+    /// The initial point, (n,).
     ///
     /// # Errors
     /// When a value is not finite.
@@ -71,28 +72,6 @@ impl Layout {
         problem.initial_point(&mut x);
         finite("variable", &x)?;
         Ok(x)
-    }
-
-    /// The multipliers to start from: the given ones, or zeros, which Ipopt then does not look at.
-    ///
-    /// # Errors
-    /// When they have the wrong length or are not finite.
-    pub fn initial_multipliers(&self, given: Option<&Multipliers>) -> Result<Multipliers, IpoptError> {
-        let (n, m) = (self.num_variables, self.num_constraints);
-        let Some(given) = given else {
-            return Ok(Multipliers { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] });
-        };
-        for (what, expected, values) in [
-            ("constraint multiplier", m, &given.constraint),
-            ("lower bound multiplier", n, &given.lower),
-            ("upper bound multiplier", n, &given.upper),
-        ] {
-            if values.len() != expected {
-                return Err(IpoptError::MultiplierCount { what, expected, actual: values.len() });
-            }
-            finite(what, values)?;
-        }
-        Ok(given.clone())
     }
 
     /// By how much g (m,) lies outside its bounds, max norm; NaN if an entry is.

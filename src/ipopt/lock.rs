@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::IpoptError;
+use super::error::IpoptError;
 
 static ONE_SOLVE: Mutex<()> = Mutex::new(());
 

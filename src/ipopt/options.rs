@@ -1,7 +1,9 @@
-//! Ipopt's options, collected with their types and checked by Ipopt itself, in silence, before a solve.
+//! Ipopt's options, collected with their types and checked by Ipopt itself before a solve, without output.
 
 use super::application::Application;
-use super::{IpoptError, LinearSolver, plug};
+use super::error::IpoptError;
+use super::linear_solver::LinearSolver;
+use super::option_value::OptionValue;
 
 /// What [`super::solve`] relies on: no option file, its own value for "no bound", and a linear solver that it has chosen.
 const RESERVED: [&str; 5] = [
@@ -12,18 +14,7 @@ const RESERVED: [&str; 5] = [
     "linear_system_scaling",
 ];
 
-/// The value of an option.
-#[derive(Clone, Debug, PartialEq)]
-pub enum OptionValue {
-    /// For options that count.
-    Int(i32),
-    /// For tolerances and the like. Ipopt 3.11 keeps six significant digits.
-    Num(f64),
-    /// For options that choose, and yes or no.
-    Str(String),
-}
-
-/// Options for Ipopt, by the names in its manual. Of two settings of one option the later one counts.
+/// Options for Ipopt, by the names in its manual. A later setting of an option overrides an earlier one.
 ///
 /// ```
 /// use warpgait::ipopt::Options;
@@ -31,8 +22,7 @@ pub enum OptionValue {
 /// ```
 ///
 /// Where they differ from Ipopt's defaults: silent (`print_level` 0, `sb` yes), `check_derivatives_for_naninf` yes,
-/// `hessian_approximation` by whether the problem has a Hessian, `warm_start_init_point` by whether
-/// multipliers are given. All of these can be set; `option_file_name`, `nlp_…_bound_inf`, `linear_system_scaling` and `linear_solver` (see
+/// `hessian_approximation` by whether the problem has a Hessian. All of these can be set; `option_file_name`, `nlp_…_bound_inf`, `linear_system_scaling` and `linear_solver` (see
 /// [`Options::linear_solver`]) cannot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
@@ -83,7 +73,7 @@ impl Options {
         self.settings.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
-    /// Hands every setting to Ipopt, which must have been silenced before.
+    /// Passes every setting to Ipopt, which must have been silenced before.
     ///
     /// # Errors
     /// The first setting that Ipopt, or this interface, does not accept.
@@ -92,7 +82,6 @@ impl Options {
         application: &mut Application,
         linear_solver: LinearSolver,
         has_hessian: bool,
-        warm_start: bool,
     ) -> Result<(), IpoptError> {
         let wants_exact = self.get("hessian_approximation") == Some(&OptionValue::Str("exact".into()));
         if wants_exact && !has_hessian {
@@ -104,10 +93,9 @@ impl Options {
         let defaults = Self::new()
             .set_str("check_derivatives_for_naninf", "yes")
             .set_str("hessian_approximation", if has_hessian { "exact" } else { "limited-memory" })
-            .set_str("warm_start_init_point", if warm_start { "yes" } else { "no" })
             .set_str("linear_system_scaling", "none");
         let defaults = match linear_solver {
-            LinearSolver::Faer => plug::configure(defaults),
+            LinearSolver::Faer => with_plug(defaults),
             _ => defaults.set_str("linear_solver", "mumps"),
         };
         for (name, value) in defaults.settings.iter().chain(&self.settings) {
@@ -117,4 +105,14 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// The options that go with the plugged-in linear solver. Its solutions are refined already, so Ipopt refines only where its own
+/// test demands it; and it has no better factorization to offer, which a larger `ma57_pivtol` would request.
+fn with_plug(options: Options) -> Options {
+    options
+        .set_str("linear_solver", "ma57")
+        .set_int("min_refinement_steps", 0)
+        .set_num("ma57_pivtol", 1e-8)
+        .set_num("ma57_pivtolmax", 1e-8)
 }

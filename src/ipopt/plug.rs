@@ -1,7 +1,7 @@
-//! The linear solver of crate `kkt` in the place of MA57, inside Ipopt.
+//! The linear solver of the crate `kkt`, plugged into Ipopt as MA57.
 //!
-//! Ipopt calls five functions without any user data, always from the thread that solves. What they share is therefore a value of that thread,
-//! present as long as [`Plugged`] lives.
+//! Ipopt calls five functions without any user data, always from the thread that solves. Their state is therefore thread-local,
+//! and exists as long as [`Plugged`].
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -12,11 +12,10 @@ use std::slice;
 use ipopt_sys::ma57;
 use kkt::{Factored, Kkt};
 
-use super::Options;
-use super::layout::Layout;
+use super::layout::ProblemLayout;
 use super::lock::SolverLock;
 
-/// What MA57's `info(1)` says.
+/// Values of MA57's `info(1)`.
 mod info {
     use std::ffi::c_int;
 
@@ -25,29 +24,22 @@ mod info {
     pub const SINGULAR: c_int = 4;
     /// Ipopt then gives up on the step.
     pub const FAILED: c_int = -1;
-    /// Places in `info`: what to say, the lengths of two arrays that nobody uses, negative eigenvalues, rank.
+    /// Places in `info`: the outcome, the lengths of two arrays that are not used, negative eigenvalues, rank.
     pub const STATUS: usize = 0;
     pub const LENGTHS: [usize; 2] = [8, 9];
     pub const NEGATIVE: usize = 23;
     pub const RANK: usize = 24;
 }
 
-/// Ipopt's options for a solve with the plug. The solves are refined already, so Ipopt refines only where its own test asks for it; and there is
-/// no better factorization to be had (`ma57_pivtol` would ask for one).
-pub fn configure(options: Options) -> Options {
-    let refinements = std::env::var("KKT_MIN").map_or(0, |v| v.parse().unwrap());
-    options
-        .set_str("linear_solver", "ma57")
-        .set_int("min_refinement_steps", refinements)
-        .set_num("ma57_pivtol", 1e-8)
-        .set_num("ma57_pivtolmax", 1e-8)
-}
+/// A solution that is refined and still has a larger residual, relative to the solution and the right-hand side, counts as failed. (Ipopt's
+/// own test demands 1e-10 and accepts what is below 1e-5.)
+const LARGEST_RESIDUAL: f64 = 1e-8;
 
-/// What the five functions share.
+/// The state of the five functions.
 #[derive(Default)]
 struct State {
     layouts: Vec<kkt::Layout>,
-    /// One for each time that Ipopt has asked for an analysis. Ipopt refers to them by their position plus one.
+    /// One for each analysis. Ipopt refers to them by their position plus one.
     matrices: Vec<Kkt>,
     failed: bool,
     panic: Option<Box<dyn Any + Send>>,
@@ -57,26 +49,26 @@ thread_local! {
     static STATE: RefCell<Option<State>> = const { RefCell::new(None) };
 }
 
-/// While this lives, Ipopt's "ma57" is the linear solver of crate `kkt`. Frees the factors when dropped.
+/// While this exists, Ipopt's "ma57" is the linear solver of the crate `kkt`. Frees the factors when dropped.
 pub struct Plugged<'lock> {
     _lock: &'lock SolverLock,
 }
 
-/// What became of the linear solver in a solve.
+/// How the linear solver fared in a solve.
 pub struct Outcome {
-    /// Something was wrong for which Ipopt has no remedy.
+    /// An error from which Ipopt cannot recover.
     pub failed: bool,
     /// Matrices that counted as singular.
     pub singular: usize,
-    /// Whether Ipopt has called at all.
+    /// Whether Ipopt called it at all.
     pub used: bool,
     /// A panic, to be resumed.
     pub panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<'lock> Plugged<'lock> {
-    /// Plugs the linear solver in for problems of this layout; `None` if the library cannot take it.
-    pub fn new(layout: &Layout, lock: &'lock SolverLock) -> Option<Self> {
+    /// Plugs the linear solver in for problems of this layout; `None` if the library cannot use it.
+    pub fn new(layout: &ProblemLayout, lock: &'lock SolverLock) -> Option<Self> {
         let set_functions = ma57::set_functions()?;
         STATE.set(Some(State { layouts: layouts(layout), ..State::default() }));
         // SAFETY: the five functions have the signatures that Ipopt's interface to MA57 calls and live as long as the process.
@@ -84,7 +76,7 @@ impl<'lock> Plugged<'lock> {
         Some(Self { _lock: lock })
     }
 
-    /// What has become of it so far; to be asked once.
+    /// The outcome so far; takes the panic out, so call it once.
     pub fn outcome(&self) -> Outcome {
         with_state(|state| Outcome {
             failed: state.failed,
@@ -95,7 +87,7 @@ impl<'lock> Plugged<'lock> {
         .expect("plugged in")
     }
 
-    /// Whether the solve is to stop, because it cannot go on with this linear solver.
+    /// Whether the solve must stop because it cannot continue with this linear solver.
     pub fn has_failed() -> bool {
         with_state(|state| state.failed || state.panic.is_some()).unwrap_or(false)
     }
@@ -103,19 +95,6 @@ impl<'lock> Plugged<'lock> {
 
 impl Drop for Plugged<'_> {
     fn drop(&mut self) {
-        if std::env::var_os("KKT_STAT").is_some() {
-            with_state(|state| {
-                for kkt in &state.matrices {
-                    eprintln!(
-                        "KKT n {} condensed {} nnzL {} {:?}",
-                        kkt.dimension(),
-                        kkt.num_condensed(),
-                        kkt.factor_len(),
-                        kkt.statistics
-                    );
-                }
-            });
-        }
         STATE.set(None);
     }
 }
@@ -126,8 +105,8 @@ fn with_state<R>(use_it: impl FnOnce(&mut State) -> R) -> Option<R> {
 
 /// The blocks of the matrix under each of Ipopt's three treatments of fixed variables: taken out (`make_parameter`, the default), left in
 /// with relaxed bounds (`relax_bounds`, what the first becomes when there are more equations than free variables), and left in with an
-/// equation each (`make_constraint`). The order of the matrix tells which one it is.
-fn layouts(layout: &Layout) -> Vec<kkt::Layout> {
+/// equation each (`make_constraint`). The order of the matrix determines which one is in effect.
+fn layouts(layout: &ProblemLayout) -> Vec<kkt::Layout> {
     let equal = |lower: &[f64], upper: &[f64]| lower.iter().zip(upper).filter(|(a, b)| a == b).count();
     let fixed = equal(&layout.variable_lower, &layout.variable_upper);
     let equations = equal(&layout.constraint_lower, &layout.constraint_upper);
@@ -139,7 +118,7 @@ fn layouts(layout: &Layout) -> Vec<kkt::Layout> {
     ]
 }
 
-/// Runs one of the functions below, and returns what `info(1)` is to say. No panic leaves it; after one, and after a failure, nothing is done any more.
+/// Runs one of the functions below, and returns the value of `info(1)`. No panic leaves it; after a panic or a failure it does nothing.
 fn guarded(work: impl FnOnce(&mut State) -> c_int) -> c_int {
     let done = with_state(|state| {
         if state.failed || state.panic.is_some() {
@@ -161,7 +140,7 @@ fn guarded(work: impl FnOnce(&mut State) -> c_int) -> c_int {
 
 // What all the functions below rely on: Ipopt passes the arrays of MA57's documentation, of which `keep` and `ifact` have at least one
 // number, `info` has 40, `cntl` 5 and `icntl` 20; it passes the same `keep` to analysis and factorization, the same `ifact` to factorization
-// and solve; nothing else uses the arrays meanwhile.
+// and solve; nothing else uses the arrays in the meantime.
 
 unsafe extern "C" fn initialize(cntl: *mut f64, icntl: *mut c_int) {
     // SAFETY: see above.
@@ -280,13 +259,16 @@ unsafe extern "C" fn solve(
             return info::FAILED;
         };
         for right_side in right_sides.chunks_exact_mut(n) {
-            kkt.solve(right_side);
+            let residual = kkt.solve(right_side);
+            if residual > LARGEST_RESIDUAL || residual.is_nan() {
+                return info::FAILED;
+            }
         }
         info::DONE
     });
 }
 
-/// Never called: no array is ever too short.
+/// Never called, because no array is ever too short.
 unsafe extern "C" fn enlarge(
     _n: *mut c_int,
     _ic: *mut c_int,
@@ -303,7 +285,7 @@ unsafe extern "C" fn enlarge(
 ) {
 }
 
-/// The matrix that an analysis has put at this position, counted from one.
+/// The matrix of an analysis, by its position counted from one.
 fn matrix(state: &mut State, keep: c_int) -> Option<&mut Kkt> {
     state.matrices.get_mut(usize::try_from(keep).ok()?.checked_sub(1)?)
 }

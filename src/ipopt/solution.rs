@@ -1,19 +1,19 @@
-//! What comes out of a solve.
+//! The result of a solve.
 
 use std::fmt;
 
 use ipopt_sys as ffi;
 use serde::Serialize;
 
-use super::LinearSolver;
+use super::linear_solver::LinearSolver;
 
 /// Which phase of Ipopt's algorithm an iteration belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// Towards the optimum.
+    /// Toward the optimum.
     Regular,
-    /// Towards feasibility alone, after the line search failed.
+    /// Toward feasibility alone, after the line search failed.
     Restoration,
 }
 
@@ -47,15 +47,22 @@ pub struct IterationRecord {
     pub seconds: f64,
 }
 
-/// Multipliers of a problem with n variables and m constraints, to start from.
+/// Multipliers of a problem with n variables and m constraints.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Multipliers {
+pub(super) struct Multipliers {
     /// (m,) of the constraints.
     pub constraint: Vec<f64>,
     /// (n,) of the lower bounds of the variables, ≥ 0.
     pub lower: Vec<f64>,
     /// (n,) of the upper bounds of the variables, ≥ 0.
     pub upper: Vec<f64>,
+}
+
+impl Multipliers {
+    /// All zero.
+    pub(super) fn zeros(n: usize, m: usize) -> Self {
+        Self { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] }
+    }
 }
 
 /// The result of a solve.
@@ -76,7 +83,7 @@ pub struct Solution {
     pub upper_multipliers: Vec<f64>,
     /// How it ended.
     pub status: Status,
-    /// Faer or MUMPS, whichever came last.
+    /// Faer or MUMPS, whichever was used last.
     pub linear_solver: LinearSolver,
     /// Every iteration, from the initial point on.
     pub history: Vec<IterationRecord>,
@@ -84,18 +91,6 @@ pub struct Solution {
     pub evaluation_seconds: f64,
     /// s in all, wall clock, without waiting for another thread's solve.
     pub total_seconds: f64,
-}
-
-impl Solution {
-    /// The multipliers, to start another solve from.
-    #[must_use]
-    pub fn multipliers(&self) -> Multipliers {
-        Multipliers {
-            constraint: self.constraint_multipliers.clone(),
-            lower: self.lower_multipliers.clone(),
-            upper: self.upper_multipliers.clone(),
-        }
-    }
 }
 
 /// How a solve ended.
@@ -112,7 +107,7 @@ pub enum Status {
     Infeasible,
     /// The search direction became too small.
     StepTooSmall,
-    /// The iterates run away to infinity.
+    /// The iterates diverge.
     Diverging,
     /// The limit of iterations was reached.
     MaxIterations,
@@ -130,9 +125,9 @@ pub enum Status {
     Interrupted,
     /// More equations than free variables.
     TooFewDegreesOfFreedom,
-    /// Ipopt holds the problem to be wrong.
+    /// Ipopt considers the problem invalid.
     InvalidProblem,
-    /// Ipopt holds an option to be wrong, for example a linear solver that is not installed.
+    /// Ipopt considers an option invalid, for example a linear solver that is not installed.
     InvalidOption,
     /// NaN or infinity where Ipopt could not step around it.
     InvalidNumber,
@@ -146,7 +141,7 @@ pub enum Status {
 const MAXIMUM_WALL_TIME_EXCEEDED: ffi::ApplicationReturnStatus = -5;
 
 impl Status {
-    /// From what `IpoptSolve` returned. A stop that was asked for counts as asked for by the callback.
+    /// From the return code of `IpoptSolve`. A requested stop counts as requested by the callback.
     pub(super) fn from_code(code: ffi::ApplicationReturnStatus) -> Self {
         match code {
             ffi::Solve_Succeeded => Self::Solved,

@@ -8,7 +8,7 @@ use crate::scenario::{Hessian, SolverSpec};
 /// more. From a feasible point, with limited memory, or in the direct formulation (24 to 29 out of the pit) it costs iterations.
 const LEAST_CENTERING: f64 = 0.3;
 
-/// Adaptive μ (monotone takes ten times the iterations), and MUMPS with the AMD ordering (1.6 times faster than its default).
+/// Adaptive μ (monotone takes ten times the iterations); if MUMPS is used, with the AMD ordering (1.6 times faster than its default).
 ///
 /// With `centered`, an iteration lowers μ to [`LEAST_CENTERING`] of the average complementarity at most. Where the Hessian is
 /// indefinite (the pit's edge in F), Ipopt's oracle drives μ to 10⁻⁶ and below while the dual infeasibility is near 1; the

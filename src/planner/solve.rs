@@ -252,7 +252,7 @@ impl<'a> Solve<'a> {
         let mut stopped = false;
         let (history, host) = (&mut self.history, &mut *self.host);
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
-        let solution = ipopt::solve(&mut problem, &options, None, &mut |record, x| {
+        let solution = ipopt::solve(&mut problem, &options, &mut |record, x| {
             let iteration = record.iteration + before;
             // A later stage starts at the point where the one before it ended, which already has its row.
             if record.iteration > 0 || history.is_empty() {

@@ -4,9 +4,9 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use warpgait::ipopt::{IpoptError, Multipliers, NlpProblem, Options, Status, solve};
+use warpgait::ipopt::{IpoptError, NlpProblem, Options, Status, solve};
 
-use crate::problems::{Hs071, go_on, run};
+use crate::problems::{Hs071, run};
 
 /// A panic in any function, at its first call or a later one, reaches the caller as it was, soon, and the next solve
 /// is as good as ever.
@@ -39,7 +39,7 @@ fn a_panic_in_the_problem_reaches_the_caller() {
 #[test]
 fn a_panic_in_the_iteration_callback_reaches_the_caller() {
     let result = catch_unwind(AssertUnwindSafe(|| {
-        solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, _| {
+        solve(&mut Hs071::new(true), &Options::new(), &mut |record, _| {
             assert!(record.iteration < 2, "enough");
             ControlFlow::Continue(())
         })
@@ -51,7 +51,7 @@ fn a_panic_in_the_iteration_callback_reaches_the_caller() {
 #[test]
 fn a_solve_inside_a_solve_is_refused() {
     let inner = RefCell::new(None);
-    let outer = solve(&mut Hs071::new(true), &Options::new(), None, &mut |_, _| {
+    let outer = solve(&mut Hs071::new(true), &Options::new(), &mut |_, _| {
         *inner.borrow_mut() = Some(run(&mut Hs071::new(true), &Options::new()));
         ControlFlow::Continue(())
     });
@@ -157,17 +157,6 @@ fn mistakes_are_found_before_the_solve() {
     assert!(error(upper_triangle).contains("entry 0 of the Hessian is at row 0, column 1"));
     let uneven = Small { hessian: Some((vec![0], vec![])), ..fine() };
     assert!(error(uneven).contains("the Hessian has 1 row indices but 0 column indices"));
-}
-
-#[test]
-fn wrong_multipliers_are_refused() {
-    let right = Multipliers { constraint: vec![0.0], lower: vec![0.0], upper: vec![0.0] };
-    let attempt = |given: &Multipliers| solve(&mut fine(), &Options::new(), Some(given), &mut go_on);
-    assert!(attempt(&right).is_ok());
-    let short = attempt(&Multipliers { lower: vec![], ..right.clone() });
-    assert!(matches!(short, Err(IpoptError::MultiplierCount { expected: 1, actual: 0, .. })));
-    let nan = attempt(&Multipliers { constraint: vec![f64::NAN], ..right });
-    assert!(matches!(nan, Err(IpoptError::NotFinite { .. })));
 }
 
 /// Also one in the Jacobian, which Ipopt by default does not look at.

@@ -6,7 +6,7 @@ use warpgait::ipopt::{IpoptError, IterationRecord, NlpProblem, Options, Solution
 
 /// Solves without a starting guess of the multipliers, and without stopping.
 pub fn run(problem: &mut impl NlpProblem, options: &Options) -> Result<Solution, IpoptError> {
-    solve(problem, options, None, &mut go_on)
+    solve(problem, options, &mut go_on)
 }
 
 pub fn go_on(_: &IterationRecord, _: &[f64]) -> ControlFlow<()> {

@@ -56,10 +56,10 @@ fn solve_in_silence() {
     ] {
         assert!(run(&mut Hs071::new(true), &refused).is_err());
     }
-    // A scaling that needs what is not installed is found out only when the solve begins.
-    let absent =
-        run(&mut Hs071::new(true), &Options::new().set_str("nlp_scaling_method", "equilibration-based"));
-    assert_eq!(absent.unwrap().status, Status::InvalidOption);
+    // Options that contradict each other are found out only when the solve begins.
+    let contradiction = Options::new().set_int("min_refinement_steps", 5).set_int("max_refinement_steps", 4);
+    let invalid = run(&mut Hs071::new(true), &contradiction);
+    assert_eq!(invalid.unwrap().status, Status::InvalidOption);
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn the_flag_interrupts() {
 #[ignore = "run by the_flag_interrupts"]
 fn interrupt_by_flag() {
     let mut seen = Vec::new();
-    let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+    let solution = solve(&mut Hs071::new(true), &Options::new(), &mut |record, x| {
         seen = x.to_vec();
         if record.iteration == 4 {
             assert!(!INTERRUPT.raise());
@@ -135,7 +135,7 @@ fn solve_slowly() {
     install_ctrl_c().unwrap();
     let mut problem = Hs071::new(true);
     problem.on_call = Box::new(|_| thread::sleep(Duration::from_millis(100)));
-    let solution = solve(&mut problem, &Options::new(), None, &mut |_, _| {
+    let solution = solve(&mut problem, &Options::new(), &mut |_, _| {
         println!("solving");
         ControlFlow::Continue(())
     });

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use warpgait::ipopt::{IterationRecord, LinearSolver, Mode, NlpProblem, Options, Solution, Status, solve};
 
-use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, Wavy, go_on, run};
+use crate::problems::{Circle, HS071_OBJECTIVE, HS071_X, Hs071, Unconstrained, Wavy, run};
 
 const LINEAR_SOLVERS: [LinearSolver; 2] = [LinearSolver::Faer, LinearSolver::Mumps];
 
@@ -70,7 +70,7 @@ fn no_constraints_and_a_fixed_variable() {
         let options =
             Options::new().linear_solver(linear_solver).set_str("fixed_variable_treatment", treatment);
         let mut seen = Vec::new();
-        let solution = solve(&mut Unconstrained, &options, None, &mut |_, x| {
+        let solution = solve(&mut Unconstrained, &options, &mut |_, x| {
             seen = x.to_vec();
             ControlFlow::Continue(())
         })
@@ -123,10 +123,10 @@ fn the_point_shown_is_the_current_iterate() {
         restorations += usize::from(record.mode == Mode::Restoration);
         ControlFlow::Continue(())
     };
-    solve(&mut Circle { right_side: -1.0 }, &Options::new(), None, &mut modes).unwrap();
+    solve(&mut Circle { right_side: -1.0 }, &Options::new(), &mut modes).unwrap();
     assert!(restorations > 0);
     let mut count = 0;
-    let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+    let solution = solve(&mut Hs071::new(true), &Options::new(), &mut |record, x| {
         assert_eq!(record.iteration, count);
         count += 1;
         assert!((Hs071::new(true).objective(x, true) - record.objective).abs() < 1e-9);
@@ -149,7 +149,7 @@ fn the_violation_is_unscaled() {
 fn the_callback_can_stop_at_its_point() {
     for stop_at in [0, 3] {
         let mut seen = Vec::new();
-        let solution = solve(&mut Hs071::new(true), &Options::new(), None, &mut |record, x| {
+        let solution = solve(&mut Hs071::new(true), &Options::new(), &mut |record, x| {
             seen = x.to_vec();
             if record.iteration == stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
@@ -170,7 +170,7 @@ fn the_callback_can_stop_in_the_restoration_phase() {
     let mut seen = Vec::new();
     let mut restorations = 0;
     let mut problem = Circle { right_side: -1.0 };
-    let solution = solve(&mut problem, &Options::new(), None, &mut |record, x| {
+    let solution = solve(&mut problem, &Options::new(), &mut |record, x| {
         seen = x.to_vec();
         restorations += usize::from(record.mode == Mode::Restoration);
         if restorations == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -190,25 +190,6 @@ fn the_same_solve_twice_takes_the_same_iterations() {
     let second = run(&mut Hs071::new(false), &options).unwrap();
     assert_eq!(first.x, second.x);
     assert_eq!(without_times(&first.history), without_times(&second.history));
-}
-
-#[test]
-fn a_warm_start_needs_fewer_iterations() {
-    let cold = run(&mut Hs071::new(true), &Options::new()).unwrap();
-    let mut problem = Hs071::new(true);
-    problem.start.copy_from_slice(&cold.x);
-    let near = Options::new()
-        .set_num("warm_start_bound_push", 1e-9)
-        .set_num("warm_start_mult_bound_push", 1e-9)
-        .set_num("warm_start_slack_bound_push", 1e-9)
-        .set_num("mu_init", 1e-9);
-    let without = run(&mut problem, &near).unwrap();
-    let warm = solve(&mut problem, &near, Some(&cold.multipliers()), &mut go_on).unwrap();
-    assert_is_hs071(&warm);
-    let lengths = [&warm, &without, &cold].map(|solution| solution.history.len());
-    assert!(lengths[0] < lengths[1] && lengths[0] < lengths[2], "{lengths:?}");
-    // The multipliers were really read: the first iterate is as good as the last one was.
-    assert!(warm.history[0].dual_infeasibility < 1e-6, "{:?}", warm.history[0]);
 }
 
 #[test]
@@ -257,7 +238,7 @@ fn rough_problems_see_the_right_points() {
         let strategy = if seed % 2 == 0 { "adaptive" } else { "monotone" };
         let options = Options::new().set_str("mu_strategy", strategy).set_int("max_iter", 100);
         let (mut problem, mut check) = (Wavy::new(20, seed), Wavy::new(20, seed));
-        let solution = solve(&mut problem, &options, None, &mut |record, x| {
+        let solution = solve(&mut problem, &options, &mut |record, x| {
             let objective = check.objective(x, true);
             assert!((objective - record.objective).abs() < 1e-8 * (1.0 + objective.abs()));
             iterations += 1;
