@@ -93,7 +93,7 @@ def test_between_the_samples_velocities_are_those_of_the_positions(trajectory: w
 @pytest.mark.parametrize("t", [-0.1, 2.1, float("nan"), [0.5, 3.0]])
 def test_times_outside_the_plan_are_refused(trajectory: warpgait.Trajectory, t: Any) -> None:
     for of in (trajectory.base, trajectory.feet):
-        with pytest.raises(ValueError, match="the plan goes from 0 to 2 s"):
+        with pytest.raises(ValueError, match="the plan lasts from 0 to 2 s"):
             of(t)
     with pytest.raises((ValueError, TypeError)):
         trajectory.base("soon")
