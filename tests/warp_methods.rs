@@ -189,6 +189,19 @@ fn cells_are_refined_where_the_bottom_misses_unless_given() {
     assert_eq!(made(&hilly(0.3), &open).1.cells, [48, 48, 16]);
 }
 
+/// The shear shows it, so that no time is spent on a finest grid of the default cells.
+#[test]
+fn ground_that_only_finer_cells_resolve_gets_them_from_the_start() {
+    let field = terrain(|x, y| 0.25 * (-(x * x + y * y) / 0.03).exp());
+    let (_, report) = made(&field, &MapSpec::default());
+    assert!(report.converged && report.inverted_points == 0 && report.misfit_max < 2e-3, "{report:?}");
+    let grids: Vec<_> = report.history.iter().map(|run| run.cells).collect();
+    assert_eq!(grids, [[12, 12, 8], [24, 24, 8], [48, 48, 8], [96, 96, 16]]);
+    // Given cells are kept.
+    let (_, report) = made(&field, &small(MapMethod::Mips));
+    assert_eq!(report.cells, [24, 24, 8]);
+}
+
 #[test]
 fn no_motion_is_planned_over_a_folded_map() {
     let folder = tempfile::tempdir().unwrap();

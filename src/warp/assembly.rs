@@ -1,34 +1,56 @@
 //! The energy of a map, the paper's E_map = ∫ w ρ(J) dV (the first term of Eq. 6), and its gradient, by quadrature on a tensor grid.
 //!
-//! J is computed one axis at a time (sum factorization), and the gradient likewise by the adjoint. The x axis is swept with a window
-//! of the four slabs of coefficients that a plane of points depends on. Within a plane, each row of points along z is processed from
-//! coefficients to energy and back before the next, so that the working set stays in the cache:
+//! J is computed one axis at a time (sum factorization), and the gradient likewise by the adjoint. A layer of four points along z
+//! fills the lanes, and all of its numbers stay in the cache. In a layer, the x axis is swept with a window of the four slabs of
+//! coefficients that a plane of points depends on:
 //!
 //! slab (contracted along z) → plane (along x) → row (along y) → ρ, ∂ρ/∂J → back to row, plane, slab.
 
 use std::cmp::Ordering;
-use std::ops::Range;
+
+use pulp::NullaryFnOnce;
 
 use super::axis::{MapAxis, Rule, Sample};
 use super::density::{Density, cofactors, determinant};
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, vectorized};
 
-/// The tensor grid and its weights.
+/// The quadrature of one grid, and the memory that its sums use again and again.
 pub(super) struct Assembly {
+    grid: TensorGrid,
+    buffers: Buffers,
+}
+
+/// The points and their weights.
+struct TensorGrid {
     axes: [MapAxis; 3],
     x: Vec<Sample>,
     y: Vec<Sample>,
     /// Their weights include the weight of the energy over z̄. The last point is repeated with weight zero to fill the lanes.
     z: Vec<Sample>,
-    weight_z: Vec<Lanes>,
+    layers: Vec<Layer>,
 }
 
-/// Numbers at a row of points along z.
-type PointRow = [Lanes];
-/// Point rows for each coefficient along y of a slab: φ₀, φ₁, φ₂ and then ∂φ₀/∂z̄, ∂φ₁/∂z̄, ∂φ₂/∂z̄.
-const SLAB_KINDS: usize = 6;
-/// Point rows for each coefficient along y of a plane: for each component, the parts of ∂/∂x̄, ∂/∂ȳ, ∂/∂z̄.
-const PLANE_KINDS: usize = 9;
+/// The points of a layer along z and the basis functions there.
+struct Layer {
+    weight: Lanes,
+    /// The first of the coefficients that the spline depends on there.
+    first: usize,
+    /// Values and slopes, by coefficient.
+    taps: Vec<[Lanes; 2]>,
+}
+
+/// At a coefficient along x and y: φ₀, φ₁, φ₂ and then ∂φ₀/∂z̄, ∂φ₁/∂z̄, ∂φ₂/∂z̄.
+type SlabPoint = [Lanes; 6];
+/// At a point along x and a coefficient along y: for each component, the parts of ∂/∂x̄, ∂/∂ȳ, ∂/∂z̄.
+type PlanePoint = [Lanes; 9];
+
+/// Slabs and a plane, each with its gradient; slab i is in place i mod 4.
+struct Buffers {
+    slabs: [Vec<SlabPoint>; 4],
+    slab_gradients: [Vec<SlabPoint>; 4],
+    plane: Vec<PlanePoint>,
+    plane_gradient: Vec<PlanePoint>,
+}
 
 impl Assembly {
     /// `weight(z̄)` is the weight of the volume, `face` (m) that of the bottom face.
@@ -46,101 +68,183 @@ impl Assembly {
             let last = z[z.len() - 1];
             z.push(Sample { weight: 0.0, ..last });
         }
-        let weight_z = z.chunks_exact(LANES).map(|s| Lanes(std::array::from_fn(|l| s[l].weight))).collect();
-        Assembly { axes, x, y, z, weight_z }
+        let layers = z.chunks_exact(LANES).map(Layer::new).collect();
+        let slabs = || std::array::from_fn(|_| vec![[Lanes::ZERO; 6]; axes[1].len()]);
+        let plane = || vec![[Lanes::ZERO; 9]; axes[1].len()];
+        let buffers =
+            Buffers { slabs: slabs(), slab_gradients: slabs(), plane: plane(), plane_gradient: plane() };
+        Assembly { grid: TensorGrid { axes, x, y, z, layers }, buffers }
     }
 
     /// The points along an axis with their weights.
     pub fn samples(&self, axis: usize) -> &[Sample] {
-        [&self.x, &self.y, &self.z][axis]
+        [&self.grid.x, &self.grid.y, &self.grid.z][axis]
     }
 
     /// The energy and its gradient with respect to the coefficients (component, x, y, z in C order). If J is not allowed at some
     /// point, the energy is infinite and the gradient meaningless.
-    pub fn energy(&self, density: impl Density, coefficients: &[f64], gradient: &mut [f64]) -> f64 {
-        self.sweep(coefficients, gradient, |_, jacobian| density.at(jacobian))
+    pub fn energy(&mut self, density: impl Density, coefficients: &[f64], gradient: &mut [f64]) -> f64 {
+        self.sweep(coefficients, gradient, Evaluated(density))
     }
 
     /// The curvature of a density at all points, in the order of [`Assembly::curvature_product`].
-    pub fn curvatures<C>(&self, coefficients: &[f64], at: impl Fn(&[Lanes; 9]) -> C) -> Vec<C> {
-        let mut found = Vec::with_capacity(self.x.len() * self.y.len() * self.weight_z.len());
+    pub fn curvatures<C>(&mut self, coefficients: &[f64], at: impl Fn(&[Lanes; 9]) -> C) -> Vec<C> {
+        let grid = &self.grid;
+        let mut found = Vec::with_capacity(grid.layers.len() * grid.x.len() * grid.y.len());
         let mut unused = vec![0.0; coefficients.len()];
-        self.sweep(coefficients, &mut unused, |_, jacobian| {
-            found.push(at(jacobian));
-            (Lanes::ZERO, [Lanes::ZERO; 9])
-        });
+        self.sweep(coefficients, &mut unused, Collected { at, found: &mut found });
         found
     }
 
     /// The second derivative of the energy times a direction, from that of the density at all points.
     pub fn curvature_product<C>(
-        &self,
+        &mut self,
         curvatures: &[C],
         times: impl Fn(&C, &[Lanes; 9]) -> [Lanes; 9],
         direction: &[f64],
         out: &mut [f64],
     ) {
-        self.sweep(direction, out, |at, change| (Lanes::ZERO, times(&curvatures[at], change)));
+        self.sweep(direction, out, Multiplied { curvatures, times });
     }
 
-    /// Visits all points, with their number and J. Sums the ρ that a visit returns to the energy, its ∂ρ/∂J to the gradient.
-    fn sweep(
-        &self,
-        coefficients: &[f64],
-        gradient: &mut [f64],
-        mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
-    ) -> f64 {
-        let blocks = self.weight_z.len();
-        let mut window = SlabWindow::new(self, coefficients);
-        let mut slab_gradients = window.slabs.clone();
-        let mut plane = self.empty(PLANE_KINDS);
-        let mut plane_gradient = plane.clone();
-        let mut energy = 0.0;
-        let mut finished = 0;
-        let mut seen = 0;
-        for sx in &self.x {
-            while finished < sx.first {
-                self.slab_adjoint(&slab_gradients[finished % 4], finished, gradient);
-                finished += 1;
-            }
-            for entered in window.advance(sx) {
-                slab_gradients[entered % 4].fill(Lanes::ZERO);
-            }
-            window.plane(sx, &mut plane);
-            plane_gradient.fill(Lanes::ZERO);
-            for sy in &self.y {
-                let weight = sx.weight * sy.weight;
-                let visit = |b: usize, jacobian: &[Lanes; 9]| visit(seen + b, jacobian);
-                energy += row(visit, sy, weight, &self.weight_z, &plane, &mut plane_gradient);
-                seen += blocks;
-                if !energy.is_finite() {
-                    return f64::INFINITY;
-                }
-            }
-            for k in 0..4 {
-                plane_adjoint(sx, k, &plane_gradient, blocks, &mut slab_gradients[(sx.first + k) % 4]);
-            }
-        }
-        for index in finished..window.entered {
-            self.slab_adjoint(&slab_gradients[index % 4], index, gradient);
-        }
-        energy
+    /// Visits all points. Sums the ρ that a visit returns to the energy, its ∂ρ/∂J to the gradient.
+    fn sweep(&mut self, coefficients: &[f64], gradient: &mut [f64], visitor: impl Visitor) -> f64 {
+        let Assembly { grid, buffers } = self;
+        vectorized(Sweep { grid, buffers, coefficients, gradient, visitor })
     }
 
     /// The least determinant of J over all points, how many determinants are not positive, and the point of the least, in cells.
-    pub fn determinants(&self, coefficients: &[f64]) -> (f64, usize, [f64; 3]) {
-        let blocks = self.weight_z.len();
-        let mut window = SlabWindow::new(self, coefficients);
-        let mut plane = self.empty(PLANE_KINDS);
+    pub fn determinants(&mut self, coefficients: &[f64]) -> (f64, usize, [f64; 3]) {
+        let Assembly { grid, buffers } = self;
+        vectorized(Determinants { grid, buffers, coefficients })
+    }
+}
+
+/// What is done at the points. (Closures would not be inlined, and so not vectorized.)
+trait Visitor {
+    /// ρ and ∂ρ/∂J from the number of four points and J.
+    fn visit(&mut self, at: usize, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]);
+}
+
+/// A density.
+struct Evaluated<D>(D);
+
+impl<D: Density> Visitor for Evaluated<D> {
+    #[inline(always)]
+    fn visit(&mut self, _: usize, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
+        self.0.at(jacobian)
+    }
+}
+
+/// Collects something at all points.
+struct Collected<'a, C, F> {
+    at: F,
+    found: &'a mut Vec<C>,
+}
+
+impl<C, F: Fn(&[Lanes; 9]) -> C> Visitor for Collected<'_, C, F> {
+    #[inline(always)]
+    fn visit(&mut self, _: usize, jacobian: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
+        self.found.push((self.at)(jacobian));
+        (Lanes::ZERO, [Lanes::ZERO; 9])
+    }
+}
+
+/// The curvatures at all points times a change of J.
+struct Multiplied<'a, C, F> {
+    curvatures: &'a [C],
+    times: F,
+}
+
+impl<C, F: Fn(&C, &[Lanes; 9]) -> [Lanes; 9]> Visitor for Multiplied<'_, C, F> {
+    #[inline(always)]
+    fn visit(&mut self, at: usize, change: &[Lanes; 9]) -> (Lanes, [Lanes; 9]) {
+        (Lanes::ZERO, (self.times)(&self.curvatures[at], change))
+    }
+}
+
+/// The arguments of [`Assembly::sweep`].
+struct Sweep<'a, V> {
+    grid: &'a TensorGrid,
+    buffers: &'a mut Buffers,
+    coefficients: &'a [f64],
+    gradient: &'a mut [f64],
+    visitor: V,
+}
+
+impl<V: Visitor> NullaryFnOnce for Sweep<'_, V> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(mut self) -> f64 {
+        let Sweep { grid, coefficients, .. } = self;
+        let Buffers { slabs, slab_gradients, plane, plane_gradient } = self.buffers;
+        self.gradient.fill(0.0);
+        let mut energy = 0.0;
+        let mut seen = 0;
+        for layer in &grid.layers {
+            let (mut entered, mut finished) = (0, 0);
+            for sx in &grid.x {
+                while finished < sx.first {
+                    grid.slab_adjoint(layer, &slab_gradients[finished % 4], finished, self.gradient);
+                    finished += 1;
+                }
+                while entered < sx.first + 4 {
+                    grid.slab(layer, coefficients, entered, &mut slabs[entered % 4]);
+                    slab_gradients[entered % 4].fill([Lanes::ZERO; 6]);
+                    entered += 1;
+                }
+                plane_of(sx, slabs, plane);
+                plane_gradient.fill([Lanes::ZERO; 9]);
+                let mut sum = Lanes::ZERO;
+                for sy in &grid.y {
+                    let weight = (sx.weight * sy.weight) * layer.weight;
+                    let (density, slope) = self.visitor.visit(seen, &jacobian(sy, plane));
+                    sum += weight * density;
+                    jacobian_adjoint(sy, &slope.map(|s| weight * s), plane_gradient);
+                    seen += 1;
+                }
+                energy += sum.sum();
+                if !energy.is_finite() {
+                    return f64::INFINITY;
+                }
+                plane_adjoint(sx, plane_gradient, slab_gradients);
+            }
+            for index in finished..entered {
+                grid.slab_adjoint(layer, &slab_gradients[index % 4], index, self.gradient);
+            }
+        }
+        energy
+    }
+}
+
+/// The arguments of [`Assembly::determinants`].
+struct Determinants<'a> {
+    grid: &'a TensorGrid,
+    buffers: &'a mut Buffers,
+    coefficients: &'a [f64],
+}
+
+impl NullaryFnOnce for Determinants<'_> {
+    type Output = (f64, usize, [f64; 3]);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Determinants { grid, buffers, coefficients } = self;
+        let Buffers { slabs, plane, .. } = buffers;
         let (mut least, mut folded, mut at) = (f64::INFINITY, 0, [0.0; 3]);
-        for sx in &self.x {
-            window.advance(sx);
-            window.plane(sx, &mut plane);
-            for sy in &self.y {
-                for b in 0..blocks {
-                    let jacobian = jacobian_lanes(sy, &plane, blocks, b);
+        for (layer, samples) in grid.layers.iter().zip(grid.z.chunks_exact(LANES)) {
+            let mut entered = 0;
+            for sx in &grid.x {
+                while entered < sx.first + 4 {
+                    grid.slab(layer, coefficients, entered, &mut slabs[entered % 4]);
+                    entered += 1;
+                }
+                plane_of(sx, slabs, plane);
+                for sy in &grid.y {
+                    let jacobian = jacobian(sy, plane);
                     let determinants = determinant(&jacobian, &cofactors(&jacobian)).0;
-                    for (det, sz) in determinants.into_iter().zip(&self.z[b * LANES..]) {
+                    for (det, sz) in determinants.into_iter().zip(samples) {
                         let folds = det.partial_cmp(&0.0) != Some(Ordering::Greater);
                         // Points of weight zero only fill the lanes and do not count.
                         folded += usize::from(folds && sz.weight != 0.0);
@@ -153,177 +257,118 @@ impl Assembly {
         }
         (least, folded, at)
     }
+}
 
-    /// Zeros for so many point rows for each coefficient along y.
-    fn empty(&self, kinds: usize) -> Vec<Lanes> {
-        vec![Lanes::ZERO; self.axes[1].len() * kinds * self.weight_z.len()]
+impl Layer {
+    fn new(samples: &[Sample]) -> Layer {
+        let first = samples.iter().map(|s| s.first).min().unwrap_or(0);
+        let end = samples.iter().map(|s| s.first + 4).max().unwrap_or(first);
+        let tap = |coefficient: usize| {
+            let weights = |of: fn(&Sample) -> &[f64; 4]| {
+                Lanes(std::array::from_fn(|l| {
+                    let k = coefficient.wrapping_sub(samples[l].first);
+                    of(&samples[l]).get(k).copied().unwrap_or(0.0)
+                }))
+            };
+            [weights(|s| &s.value), weights(|s| &s.slope)]
+        };
+        let weight = Lanes(std::array::from_fn(|l| samples[l].weight));
+        Layer { weight, first, taps: (first..end).map(tap).collect() }
     }
+}
 
+impl TensorGrid {
     /// Along z: the slab of the coefficients with one index along x.
-    fn slab(&self, coefficients: &[f64], index: usize, slab: &mut [Lanes]) {
+    #[inline(always)]
+    fn slab(&self, layer: &Layer, coefficients: &[f64], index: usize, slab: &mut [SlabPoint]) {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
-        let blocks = self.weight_z.len();
-        for (j, row) in slab.chunks_exact_mut(SLAB_KINDS * blocks).enumerate() {
-            let (values, slopes) = row.split_at_mut(3 * blocks);
-            for c in 0..3 {
-                let line = &coefficients[((c * nx + index) * ny + j) * nz..][..nz];
-                for (b, samples) in self.z.chunks_exact(LANES).enumerate() {
-                    let along = |weights: fn(&Sample) -> &[f64; 4]| {
-                        Lanes(std::array::from_fn(|l| {
-                            let (w, u) = (weights(&samples[l]), &line[samples[l].first..][..4]);
-                            w[0] * u[0] + w[1] * u[1] + w[2] * u[2] + w[3] * u[3]
-                        }))
-                    };
-                    values[c * blocks + b] = along(|s| &s.value);
-                    slopes[c * blocks + b] = along(|s| &s.slope);
+        for c in 0..3 {
+            let lines = coefficients[(c * nx + index) * ny * nz..][..ny * nz].chunks_exact(nz);
+            for (point, line) in slab.iter_mut().zip(lines) {
+                let (mut value, mut slope) = (Lanes::ZERO, Lanes::ZERO);
+                for (taps, u) in layer.taps.iter().zip(&line[layer.first..]) {
+                    value += *u * taps[0];
+                    slope += *u * taps[1];
                 }
+                (point[c], point[3 + c]) = (value, slope);
             }
         }
     }
 
-    /// The adjoint of [`Assembly::slab`].
-    fn slab_adjoint(&self, slab: &[Lanes], index: usize, gradient: &mut [f64]) {
+    /// The adjoint of [`TensorGrid::slab`]; adds to the gradient.
+    #[inline(always)]
+    fn slab_adjoint(&self, layer: &Layer, slab: &[SlabPoint], index: usize, gradient: &mut [f64]) {
         let [nx, ny, nz] = self.axes.map(|a| a.len());
-        let blocks = self.weight_z.len();
-        for (j, row) in slab.chunks_exact(SLAB_KINDS * blocks).enumerate() {
-            let (values, slopes) = row.split_at(3 * blocks);
-            for c in 0..3 {
-                let line = &mut gradient[((c * nx + index) * ny + j) * nz..][..nz];
-                line.fill(0.0);
-                let values = Lanes::flat(&values[c * blocks..][..blocks]);
-                let slopes = Lanes::flat(&slopes[c * blocks..][..blocks]);
-                for ((value, slope), s) in values.zip(slopes).zip(&self.z) {
-                    for (k, u) in line[s.first..s.first + 4].iter_mut().enumerate() {
-                        *u += s.value[k] * value + s.slope[k] * slope;
-                    }
+        for c in 0..3 {
+            let lines = gradient[(c * nx + index) * ny * nz..][..ny * nz].chunks_exact_mut(nz);
+            for (point, line) in slab.iter().zip(lines) {
+                for (taps, u) in layer.taps.iter().zip(&mut line[layer.first..]) {
+                    *u += (taps[0] * point[c] + taps[1] * point[3 + c]).sum();
                 }
             }
         }
     }
 }
 
-/// The slabs of the four coefficients along x that a plane of points depends on; slab i is in place i mod 4.
-struct SlabWindow<'a> {
-    assembly: &'a Assembly,
-    coefficients: &'a [f64],
-    slabs: [Vec<Lanes>; 4],
-    /// Slabs computed so far.
-    entered: usize,
-}
-
-impl<'a> SlabWindow<'a> {
-    fn new(assembly: &'a Assembly, coefficients: &'a [f64]) -> SlabWindow<'a> {
-        let slabs = std::array::from_fn(|_| assembly.empty(SLAB_KINDS));
-        SlabWindow { assembly, coefficients, slabs, entered: 0 }
-    }
-
-    /// Computes the slabs around a plane that are not yet in the window, and returns which.
-    fn advance(&mut self, plane: &Sample) -> Range<usize> {
-        let entering = self.entered..plane.first + 4;
-        for index in entering.clone() {
-            self.assembly.slab(self.coefficients, index, &mut self.slabs[index % 4]);
-        }
-        self.entered = entering.end;
-        entering
-    }
-
-    /// Along x: a plane of points from the slabs around it.
-    fn plane(&self, s: &Sample, plane: &mut [Lanes]) {
-        let slab = |k: usize| &self.slabs[(s.first + k) % 4][..];
-        plane_of(s, [slab(0), slab(1), slab(2), slab(3)], self.assembly.weight_z.len(), plane);
-    }
-}
-
-/// Along x: a plane of points from the four slabs around it.
-fn plane_of(s: &Sample, slabs: [&[Lanes]; 4], blocks: usize, plane: &mut [Lanes]) {
-    let width = SLAB_KINDS * blocks;
-    for (j, out) in plane.chunks_exact_mut(PLANE_KINDS * blocks).enumerate() {
-        let sources = slabs.map(|slab| &slab[j * width..][..width]);
-        for c in 0..3 {
-            let values = sources.map(|row| &row[c * blocks..][..blocks]);
-            let slopes = sources.map(|row| &row[(3 + c) * blocks..][..blocks]);
-            let out = &mut out[3 * c * blocks..][..3 * blocks];
-            combine(&s.slope, values, &mut out[..blocks]);
-            combine(&s.value, values, &mut out[blocks..2 * blocks]);
-            combine(&s.value, slopes, &mut out[2 * blocks..]);
-        }
-    }
-}
-
-/// The adjoint of [`plane_of`] with respect to the k-th slab; adds to it.
-fn plane_adjoint(s: &Sample, k: usize, plane: &[Lanes], blocks: usize, slab: &mut [Lanes]) {
-    if s.value[k] == 0.0 && s.slope[k] == 0.0 {
-        return;
-    }
-    let rows = plane.chunks_exact(PLANE_KINDS * blocks).zip(slab.chunks_exact_mut(SLAB_KINDS * blocks));
-    for (source, out) in rows {
-        let (values, slopes) = out.split_at_mut(3 * blocks);
-        for c in 0..3 {
-            let source = &source[3 * c * blocks..][..3 * blocks];
-            accumulate(s.slope[k], &source[..blocks], &mut values[c * blocks..][..blocks]);
-            accumulate(s.value[k], &source[blocks..2 * blocks], &mut values[c * blocks..][..blocks]);
-            accumulate(s.value[k], &source[2 * blocks..], &mut slopes[c * blocks..][..blocks]);
-        }
-    }
-}
-
-/// Along y and back: returns the energy of one row of points and adds its gradient to the plane's.
-#[inline]
-fn row(
-    mut visit: impl FnMut(usize, &[Lanes; 9]) -> (Lanes, [Lanes; 9]),
-    s: &Sample,
-    weight: f64,
-    weight_z: &[Lanes],
-    plane: &[Lanes],
-    plane_gradient: &mut [Lanes],
-) -> f64 {
-    let blocks = weight_z.len();
-    let width = PLANE_KINDS * blocks;
-    let targets = &mut plane_gradient[s.first * width..][..4 * width];
-    let mut sum = Lanes::ZERO;
-    for b in 0..blocks {
-        let jacobian = jacobian_lanes(s, plane, blocks, b);
-        let (density, slope) = visit(b, &jacobian);
-        let weight = weight * weight_z[b];
-        sum += weight * density;
-        for (kind, source) in slope.iter().enumerate() {
-            let source = weight * *source;
-            let w = if kind % 3 == 1 { &s.slope } else { &s.value };
-            for k in 0..4 {
-                targets[k * width + kind * blocks + b] += w[k] * source;
-            }
-        }
-    }
-    sum.sum()
-}
-
-/// Along y: J at one block of points of a row.
+/// Along x: a plane of points from the slabs around it.
 #[inline(always)]
-fn jacobian_lanes(s: &Sample, plane: &[Lanes], blocks: usize, block: usize) -> [Lanes; 9] {
-    let width = PLANE_KINDS * blocks;
-    let sources: [&PointRow; 4] = std::array::from_fn(|k| &plane[(s.first + k) * width..][..width]);
+fn plane_of(s: &Sample, slabs: &[Vec<SlabPoint>; 4], plane: &mut [PlanePoint]) {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| &slabs[(s.first + k) % 4]);
+    let sources = a.iter().zip(b).zip(c).zip(d);
+    for (out, (((a, b), c), d)) in plane.iter_mut().zip(sources) {
+        for i in 0..3 {
+            let value = [a[i], b[i], c[i], d[i]];
+            out[3 * i] = combination(&s.slope, value);
+            out[3 * i + 1] = combination(&s.value, value);
+            out[3 * i + 2] = combination(&s.value, [a[3 + i], b[3 + i], c[3 + i], d[3 + i]]);
+        }
+    }
+}
+
+/// The adjoint of [`plane_of`]; adds to the gradients of the slabs.
+#[inline(always)]
+fn plane_adjoint(s: &Sample, plane: &[PlanePoint], slabs: &mut [Vec<SlabPoint>; 4]) {
+    for k in 0..4 {
+        let (value, slope) = (s.value[k], s.slope[k]);
+        if value == 0.0 && slope == 0.0 {
+            continue;
+        }
+        for (out, source) in slabs[(s.first + k) % 4].iter_mut().zip(plane) {
+            for i in 0..3 {
+                out[i] += slope * source[3 * i] + value * source[3 * i + 1];
+                out[3 + i] += value * source[3 * i + 2];
+            }
+        }
+    }
+}
+
+/// Along y: J at four points.
+#[inline(always)]
+fn jacobian(s: &Sample, plane: &[PlanePoint]) -> [Lanes; 9] {
+    let [a, b, c, d]: &[PlanePoint; 4] = plane[s.first..].first_chunk().expect("four coefficients");
     let mut jacobian = [Lanes::ZERO; 9];
     for (kind, out) in jacobian.iter_mut().enumerate() {
         let w = if kind % 3 == 1 { &s.slope } else { &s.value };
-        let at = kind * blocks + block;
-        *out = w[0] * sources[0][at] + w[1] * sources[1][at] + w[2] * sources[2][at] + w[3] * sources[3][at];
+        *out = combination(w, [a[kind], b[kind], c[kind], d[kind]]);
     }
     jacobian
 }
 
-/// out = Σ wₖ sourceₖ.
-fn combine(w: &[f64; 4], sources: [&PointRow; 4], out: &mut PointRow) {
-    let [a, b, c, d] = sources;
-    for ((((o, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        *o = w[0] * *a + w[1] * *b + w[2] * *c + w[3] * *d;
+/// The adjoint of [`jacobian`]; adds to the gradient of the plane.
+#[inline(always)]
+fn jacobian_adjoint(s: &Sample, slope: &[Lanes; 9], plane: &mut [PlanePoint]) {
+    for (k, target) in plane[s.first..s.first + 4].iter_mut().enumerate() {
+        for (kind, (target, slope)) in target.iter_mut().zip(slope).enumerate() {
+            let w = if kind % 3 == 1 { s.slope[k] } else { s.value[k] };
+            *target += w * *slope;
+        }
     }
 }
 
-/// out += w source.
-fn accumulate(w: f64, source: &PointRow, out: &mut PointRow) {
-    for (o, a) in out.iter_mut().zip(source) {
-        *o += w * *a;
-    }
+/// Σ wₖ sourceₖ.
+#[inline(always)]
+fn combination(w: &[f64; 4], [a, b, c, d]: [Lanes; 4]) -> Lanes {
+    w[0] * a + w[1] * b + w[2] * c + w[3] * d
 }
 
 #[cfg(test)]
@@ -354,7 +399,7 @@ mod tests {
             }
         }
         for rule in [Rule::Lobatto, Rule::Gauss] {
-            let assembly = Assembly::new(axes, rule, |z| (-z).exp(), 0.5);
+            let mut assembly = Assembly::new(axes, rule, |z| (-z).exp(), 0.5);
             let mut gradient = vec![f64::NAN; u.len()];
             let mut unused = vec![0.0; u.len()];
             let energy = assembly.energy(Mips, &u, &mut gradient);

@@ -13,7 +13,8 @@ use super::local_global::alternate;
 use super::objective::{Minimized, Observer, StoppingLimits};
 use super::problem::{Quadrature, WarpProblem};
 use super::report::{EnergyHistory, MapReport, RejectedMap};
-use super::spline::WarpMap;
+use super::shear::ShearedFace;
+use super::spline::{WarpMap, checked_box};
 use crate::heightfield::Heightfield;
 use crate::scenario::{MapMethod, MapSpec};
 use crate::{Error, Result};
@@ -33,8 +34,10 @@ pub struct MapProgress {
     pub tolerance: f64,
 }
 
-/// The relative decrement at which the optimizer converges, on all grids.
+/// The relative decrement at which the optimizer converges on the finest grid.
 const TOLERANCE: f64 = 1e-4;
+/// The same on coarser grids and while ground grows. With the finest grid's, maps are no better and take a sixth longer.
+const COARSE_TOLERANCE: f64 = 3e-3;
 /// Energies much below this are rounding errors, m³, as over flat ground.
 const ENERGY_FLOOR: f64 = 1e-9;
 /// On the finest grid. The benchmark's hardest terrain takes 300.
@@ -53,6 +56,10 @@ const COARSEST: usize = 8;
 /// If the scenario does not give the cells, and the bottom misses the terrain by this much, m, the cells are halved along x and y.
 /// Below, there is no need; above, the terrain has edges that cells of half the size do not follow either.
 const WORTH_REFINING: Range<f64> = 1e-3..1e-2;
+/// Halving the cells resolves the terrain if it decreases the misfit of the shear by this factor.
+const RESOLVED: f64 = 0.25;
+/// On ground steeper than this, finer cells fold between their quadrature points or converge slowly (the walls of scanned stairs).
+const STEEP: f64 = 5.0;
 /// What `map.method = "auto"` tries before [`FALLBACK`], in order of cost. (Wherever `dirichlet` is good enough, the shear is better
 /// at the ground; the other methods are more expensive than `mips`.)
 const CHEAPER: [MapMethod; 1] = [MapMethod::Shear];
@@ -136,17 +143,39 @@ fn worth_refining(spec: &MapSpec, report: &MapReport) -> bool {
     spec.cells.is_none() && report.inverted_points == 0 && WORTH_REFINING.contains(&report.misfit_max)
 }
 
-/// Minimizes an energy on one grid, from the coefficients given, and returns those where it ends.
+/// The cells of the finest grid to begin with. Where the shear shows that it must be refined, it is fine from the start.
+fn finest_cells(field: &Heightfield, spec: &MapSpec) -> [usize; 3] {
+    let cells @ [x, y, _] = spec.cells(field.extent());
+    let Some(finer) = halved(field, spec) else {
+        return cells;
+    };
+    let misfit = ShearedFace::new(field, [x, y]).misfit();
+    let resolved = misfit > WORTH_REFINING.start
+        && ShearedFace::new(field, [finer[0], finer[1]]).misfit() < RESOLVED * misfit;
+    if resolved { finer } else { cells }
+}
+
+/// The default cells, halved along x and y; none if the scenario gives the cells, if these are too many, or if the terrain is too
+/// steep for them to help.
+fn halved(field: &Heightfield, spec: &MapSpec) -> Option<[usize; 3]> {
+    let [x, y, z] = spec.cells(field.extent());
+    let finer = MapSpec { cells: Some([2 * x, 2 * y, z]), ..spec.clone() };
+    let possible = spec.cells.is_none() && checked_box(field.extent(), &finer).is_ok();
+    let useful = possible && ShearedFace::new(field, [x, y]).steepest(field) <= STEEP;
+    finer.cells.filter(|_| useful)
+}
+
+/// Minimizes an energy on one grid, from the unknowns given, and returns those where it ends.
 type Minimizer<D> =
     fn(&mut WarpProblem<'_, D>, Vec<f64>, StoppingLimits, &mut Observer) -> (Vec<f64>, Minimized);
 
 fn quasi_newton<D: Density>(
     problem: &mut WarpProblem<'_, D>,
-    u: Vec<f64>,
+    v: Vec<f64>,
     limits: StoppingLimits,
     observer: &mut Observer,
 ) -> (Vec<f64>, Minimized) {
-    minimize(problem, u, limits, observer)
+    minimize(problem, v, limits, observer)
 }
 
 /// The map that minimizes an energy.
@@ -163,6 +192,7 @@ fn optimized<D: Density>(
         density,
         minimizer,
         progress,
+        cells: finest_cells(field, spec),
         iterations: 0,
         evaluations: 0,
         notes: Vec::new(),
@@ -198,11 +228,12 @@ enum GridLevel {
 }
 
 impl GridLevel {
-    fn max_iterations(self) -> usize {
-        match self {
-            GridLevel::Coarse => MAX_COARSE_ITERATIONS,
-            GridLevel::Finest => MAX_ITERATIONS,
-        }
+    fn limits(self) -> StoppingLimits {
+        let (iterations, tolerance) = match self {
+            GridLevel::Coarse => (MAX_COARSE_ITERATIONS, COARSE_TOLERANCE),
+            GridLevel::Finest => (MAX_ITERATIONS, TOLERANCE),
+        };
+        StoppingLimits { iterations, tolerance, floor: ENERGY_FLOOR }
     }
 }
 
@@ -213,6 +244,8 @@ struct MapBuilder<'a, D> {
     density: D,
     minimizer: Minimizer<D>,
     progress: &'a mut dyn FnMut(MapProgress) -> ControlFlow<()>,
+    /// Of the finest grid.
+    cells: [usize; 3],
     /// Iterations so far.
     iterations: usize,
     /// Evaluations of the energy so far.
@@ -224,7 +257,7 @@ struct MapBuilder<'a, D> {
 impl<D: Density> MapBuilder<'_, D> {
     /// From the coarsest grid to that of the specification.
     fn attempt(&mut self, points: Quadrature) -> Result<Attempt> {
-        let (coarsest, halvings) = halvings(self.spec.cells(self.field.extent()));
+        let (coarsest, halvings) = halvings(self.cells);
         let mut map = self.shear(coarsest)?;
         for halved in halvings.into_iter().rev() {
             map = self.minimized(&map, points, GridLevel::Coarse)?.0.refined(halved);
@@ -249,9 +282,11 @@ impl<D: Density> MapBuilder<'_, D> {
         Ok(best)
     }
 
-    /// Halves the cells along x and y if that is worthwhile.
+    /// Halves the cells along x and y if that is worthwhile and has not been done.
     fn refined_if_worthwhile(&mut self, attempt: Attempt) -> Result<Attempt> {
-        if !worth_refining(self.spec, &attempt.report) {
+        let worthwhile = worth_refining(self.spec, &attempt.report)
+            && halved(self.field, self.spec).is_some_and(|finer| finer != self.cells);
+        if !worthwhile {
             return Ok(attempt);
         }
         let finer = self.finest(&attempt.map.refined([true, true, false]), attempt.points)?;
@@ -269,7 +304,7 @@ impl<D: Density> MapBuilder<'_, D> {
         if !report.converged {
             report.warnings.push(format!(
                 "the optimizer stopped before it converged (gᵀd is {:.1e} of the energy, not {TOLERANCE:.0e}), as happens where the terrain is too steep for the cells; the map could be better",
-                limits(MAX_ITERATIONS).relative(minimized.value, minimized.decrement)
+                GridLevel::Finest.limits().relative(minimized.value, minimized.decrement)
             ));
         }
         report.warnings.append(&mut self.notes);
@@ -311,38 +346,41 @@ impl<D: Density> MapBuilder<'_, D> {
         level: GridLevel,
     ) -> Result<Option<(WarpMap, Minimized)>> {
         let mut problem = WarpProblem::new(self.field, self.density, map, points)?;
-        let mut u = problem.coefficients(map);
+        let u = problem.coefficients(map);
         let gap = problem.gap(&u);
+        let mut v = problem.unknowns(u);
         let mut minimized = Minimized::default();
         for step in 1..=steps {
             problem.lower_ground(&gap, 1.0 - step as f64 / steps as f64);
-            problem.move_onto_ground(&mut u);
             if level == GridLevel::Coarse {
-                problem.drop_dominant_misfit(&u);
+                problem.soften_misfit(&v);
             }
-            let iterations = if step < steps { GROWTH_ITERATIONS } else { level.max_iterations() };
-            (u, minimized) = self.run_minimizer(&mut problem, u, map.cells(), iterations)?;
+            let limits = if step < steps {
+                GridLevel::Coarse.limits().at_most(GROWTH_ITERATIONS)
+            } else {
+                level.limits()
+            };
+            (v, minimized) = self.run_minimizer(&mut problem, v, map.cells(), limits)?;
             if !minimized.value.is_finite() {
                 return Ok(None);
             }
         }
-        Ok(Some((problem.to_map(&u, map), minimized)))
+        Ok(Some((problem.map_of(v, map), minimized)))
     }
 
     /// Runs the minimizer once and records its cost.
     fn run_minimizer(
         &mut self,
         problem: &mut WarpProblem<'_, D>,
-        u: Vec<f64>,
+        v: Vec<f64>,
         cells: [usize; 3],
-        iterations: usize,
+        limits: StoppingLimits,
     ) -> Result<(Vec<f64>, Minimized)> {
-        let limits = limits(iterations);
         let mut energies = Vec::new();
-        let (u, minimized) = (self.minimizer)(problem, u, limits, &mut |iteration, energy, decrement| {
+        let (v, minimized) = (self.minimizer)(problem, v, limits, &mut |iteration, energy, decrement| {
             energies.push(energy);
             let decrement = limits.relative(energy, decrement);
-            (self.progress)(MapProgress { cells, iteration, energy, decrement, tolerance: TOLERANCE })
+            (self.progress)(MapProgress { cells, iteration, energy, decrement, tolerance: limits.tolerance })
         });
         if minimized.interrupted {
             return Err(Error::input("the warp map was stopped before it was finished"));
@@ -350,18 +388,13 @@ impl<D: Density> MapBuilder<'_, D> {
         self.history.push(EnergyHistory { cells, energy: energies });
         self.iterations += minimized.iterations;
         self.evaluations += minimized.evaluations;
-        Ok((u, minimized))
+        Ok((v, minimized))
     }
 
     /// The shear on a grid with this many cells.
     fn shear(&self, cells: [usize; 3]) -> Result<WarpMap> {
         WarpMap::shear(self.field, &MapSpec { cells: Some(cells), ..self.spec.clone() })
     }
-}
-
-/// The limits of all minimizers.
-fn limits(iterations: usize) -> StoppingLimits {
-    StoppingLimits { iterations, tolerance: TOLERANCE, floor: ENERGY_FLOOR }
 }
 
 /// The cells of the coarsest grid, and along which axes to halve the cells of `cells`, and those that result, to arrive there.

@@ -17,7 +17,7 @@ use crate::scenario::MapSpec;
 use crate::{Error, Result, digest, files};
 
 /// Increase this with every change that yields a different map of the same terrain.
-const SOLVER_VERSION: u32 = 5;
+const SOLVER_VERSION: u32 = 6;
 
 #[derive(Serialize, Deserialize)]
 struct Header {

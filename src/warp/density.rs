@@ -41,7 +41,7 @@ pub(super) fn weight(z: f64, torso: f64) -> f64 {
 
 /// The face weight of these energies. At 0.7 the mean conformal error is a third larger at the ground and a thirtieth smaller at
 /// torso height (`mips`, all of the benchmark's terrains except the pit).
-pub(super) const FACE_WEIGHT: f64 = 1.0;
+pub(super) const FACE_WEIGHT: f64 = 1.1;
 
 /// Determinants up to this count as folded. Also the least argument of [`inverse_cube_root`].
 pub(super) const MIN_DET: f64 = 1e-12;

@@ -21,16 +21,16 @@ const DAMPING: [f64; 2] = [0.01, 10.0];
 /// By how much the damping grows after a step that was cut, and shrinks after one that was not.
 const DAMPING_FACTOR: f64 = 4.0;
 
-/// Minimizes from u and returns where it ends. Does nothing if space is folded at u. The observer receives gᵀd, d the step, as the
+/// Minimizes from v and returns where it ends. Does nothing if space is folded at v. The observer receives gᵀd, d the step, as the
 /// decrement.
 pub(super) fn gauss_newton(
     problem: &mut WarpProblem<'_, Barrier>,
-    u: Vec<f64>,
+    v: Vec<f64>,
     limits: StoppingLimits,
     observer: &mut Observer,
 ) -> (Vec<f64>, Minimized) {
     let limits = limits.at_most(MAX_ITERATIONS);
-    let mut current = Iterate::new(problem, u);
+    let mut current = Iterate::new(problem, v);
     let mut minimized = Minimized::begun(current.value);
     if !current.value.is_finite() {
         return (current.x, minimized);
@@ -83,7 +83,7 @@ fn newton_step(problem: &mut WarpProblem<'_, Barrier>, current: &Iterate, dampin
     let first = dot(&residual, &conditioned);
     let mut square = first;
     for _ in 0..MAX_INNER {
-        problem.gauss_newton_product(&linearized, BarrierCurvature::times, &mut direction, &mut product);
+        problem.gauss_newton_product(&linearized, BarrierCurvature::times, &direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature <= 0.0 {
             break;

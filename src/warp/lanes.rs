@@ -2,8 +2,17 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
+use pulp::{Arch, NullaryFnOnce};
+
 /// How many: one vector register of AVX, two of SSE2. (Loops are used below because, unlike array functions, they reliably vectorize.)
 pub(super) const LANES: usize = 4;
+
+/// Does `work` with the widest registers that this processor has. What it calls must be inlined to profit. The results are the
+/// same on every processor, because the compiler neither fuses nor reorders arithmetic.
+#[inline(always)]
+pub(super) fn vectorized<W: NullaryFnOnce>(work: W) -> W::Output {
+    Arch::new().dispatch(work)
+}
 
 /// One number for each of several points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,13 +37,9 @@ impl Lanes {
     }
 
     /// The sum over the points.
+    #[inline(always)]
     pub fn sum(self) -> f64 {
         self.0.iter().sum()
-    }
-
-    /// The numbers of several blocks in order.
-    pub fn flat(blocks: &[Lanes]) -> impl Iterator<Item = &f64> {
-        blocks.iter().flat_map(|b| &b.0)
     }
 }
 

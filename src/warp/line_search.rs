@@ -28,7 +28,7 @@ pub(super) fn backtrack(
         for ((t, x), d) in trial.x.iter_mut().zip(&current.x).zip(direction) {
             *t = x - scale * d;
         }
-        trial.value = objective.evaluate(&mut trial.x, &mut trial.gradient);
+        trial.value = objective.evaluate(&trial.x, &mut trial.gradient);
         *evaluations += 1;
         // False for an infinite value.
         if trial.value <= current.value - SUFFICIENT_DECREASE * scale * decrement {

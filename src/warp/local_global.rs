@@ -8,17 +8,18 @@ use super::problem::WarpProblem;
 /// Where it converges it takes a few dozen rounds; where the map is folded it never does.
 const MAX_ROUNDS: usize = 150;
 
-/// Alternates from u and returns where it ends. The observer receives the square of the last step, in the norm of the energy, as the decrement.
+/// Alternates from v and returns where it ends. The observer receives the square of the last step, in the norm of the energy, as the decrement.
 ///
 /// Each round freezes the ground under the bottom face, and with it the ground's slope. So the energy may rise, and the limit is not
 /// a minimum of Eq. 6.
 pub(super) fn alternate<D: Density>(
     problem: &mut WarpProblem<'_, D>,
-    mut u: Vec<f64>,
+    v: Vec<f64>,
     limits: StoppingLimits,
     observer: &mut Observer,
 ) -> (Vec<f64>, Minimized) {
     let limits = limits.at_most(MAX_ROUNDS);
+    let mut u = problem.on_ground(v);
     let mut minimized = Minimized::default();
     loop {
         let (value, decrement) = problem.alternate(&mut u);
@@ -28,7 +29,6 @@ pub(super) fn alternate<D: Density>(
         }
         minimized.iterations += 1;
     }
-    // The bottom face is still on the ground of the last round's start.
-    problem.move_onto_ground(&mut u);
-    (u, minimized)
+    // The bottom face is still on the ground of the last round's start; the unknowns are relative to it.
+    (problem.unknowns(u), minimized)
 }

@@ -5,6 +5,7 @@ mod axis;
 mod barrier;
 mod basis;
 mod bottom;
+mod bottom_face;
 mod build;
 mod cache;
 mod density;

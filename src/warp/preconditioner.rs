@@ -17,7 +17,7 @@ use crate::{Error, Result};
 /// K_c⁻¹ for the three components.
 pub(super) struct Preconditioner {
     components: [Component; 3],
-    scratch: [Vec<f64>; 2],
+    scratch: [Vec<f64>; 3],
 }
 
 /// K_c⁻¹ for one component.
@@ -47,91 +47,80 @@ impl Preconditioner {
     ) -> Result<Preconditioner> {
         let pencils = samples.map(pencil);
         let stiffness = |c: usize| std::array::from_fn(|d| if c == d { along } else { across });
-        let component = |c: usize| Component::new(&pencils, &free[c], stiffness(c));
+        // By axis, the solutions for its ranges of free indices: components have most of them in common.
+        let mut solved: [Vec<(&Range<usize>, Modes)>; 3] = Default::default();
+        for range in &free {
+            for d in 0..3 {
+                if solved[d].iter().all(|(known, _)| **known != range[d]) {
+                    solved[d].push((&range[d], Modes::new(&pencils[d], &range[d])?));
+                }
+            }
+        }
+        let component = |c: usize| {
+            let modes = std::array::from_fn(|d| solved[d].iter().find(|(known, _)| **known == free[c][d]));
+            let modes = modes.map(|found| found.map(|(_, modes)| modes).expect("solved above"));
+            Component::new(modes, stiffness(c))
+        };
         Ok(Preconditioner {
-            components: [component(0)?, component(1)?, component(2)?],
-            scratch: [Vec::new(), Vec::new()],
+            components: [component(0), component(1), component(2)],
+            scratch: Default::default(),
         })
     }
 
     /// `v` ← K⁻¹ `v`, for vectors (component, x, y, z) in C order.
     pub fn apply(&mut self, v: &mut [f64]) {
         let length = v.len() / 3;
-        let [a, b] = &mut self.scratch;
+        let [modes, back, scratch] = &mut self.scratch;
         for (component, v) in self.components.iter().zip(v.chunks_exact_mut(length)) {
-            let modes = tensor_product(&component.transposed, v, a, b);
+            tensor_product(&component.transposed, &component.vectors, v, modes, scratch);
             for (m, inverse) in modes.iter_mut().zip(&component.inverse) {
                 *m *= inverse;
             }
-            let modes = std::mem::take(a);
-            let mut back = Vec::new();
-            v.copy_from_slice(tensor_product(&component.vectors, &modes, &mut back, b));
-            *a = back;
+            tensor_product(&component.vectors, &component.transposed, modes, back, scratch);
+            v.copy_from_slice(back);
         }
     }
 }
 
 impl Component {
-    /// From stiffness and mass matrix, free indices and stiffness by axis.
-    fn new(
-        pencils: &[[DMatrix<f64>; 2]; 3],
-        free: &[Range<usize>; 3],
-        stiffness: [f64; 3],
-    ) -> Result<Component> {
-        let eigen = |d: usize| -> Result<(DMatrix<f64>, Vec<f64>)> {
-            let (vectors, values) = eigen(&pencils[d], &free[d])?;
-            Ok((vectors, values.iter().map(|l| stiffness[d] * l.max(0.0)).collect()))
-        };
-        let ((v0, values0), (v1, values1), (v2, values2)) = (eigen(0)?, eigen(1)?, eigen(2)?);
-        let all = values0.iter().chain(&values1).chain(&values2);
-        let least = LEAST_EIGENVALUE * all.fold(0.0, |a: f64, b| a.max(*b));
-        let mut inverse = Vec::with_capacity(values0.len() * values1.len() * values2.len());
-        for a in &values0 {
-            for b in &values1 {
-                inverse.extend(values2.iter().map(|c| 1.0 / (a + b + c).max(least)));
+    /// From the modes and the stiffness by axis.
+    fn new(modes: [&Modes; 3], stiffness: [f64; 3]) -> Component {
+        let values: [Vec<f64>; 3] =
+            std::array::from_fn(|d| modes[d].values.iter().map(|l| stiffness[d] * l.max(0.0)).collect());
+        let least = LEAST_EIGENVALUE * values.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+        let mut inverse = Vec::with_capacity(values.iter().map(Vec::len).product());
+        for a in &values[0] {
+            for b in &values[1] {
+                inverse.extend(values[2].iter().map(|c| 1.0 / (a + b + c).max(least)));
             }
         }
-        let vectors = [v0, v1, v2];
-        Ok(Component { transposed: std::array::from_fn(|d| vectors[d].transpose()), vectors, inverse })
+        let vectors = modes.map(|m| m.vectors.clone());
+        Component { transposed: std::array::from_fn(|d| vectors[d].transpose()), vectors, inverse }
     }
 }
 
-/// Writes (A₀⊗A₁⊗A₂) u to `out`, by way of `scratch`.
-fn tensor_product<'a>(
+/// Writes (A₀⊗A₁⊗A₂) u to `out`, by way of `scratch`, given the three matrices and their transposes.
+fn tensor_product(
     matrices: &[DMatrix<f64>; 3],
+    transposed: &[DMatrix<f64>; 3],
     u: &[f64],
-    out: &'a mut Vec<f64>,
+    out: &mut Vec<f64>,
     scratch: &mut Vec<f64>,
-) -> &'a mut [f64] {
+) {
     let [n0, n1, n2] = [0, 1, 2].map(|d| matrices[d].ncols());
     let [m0, m1, m2] = [0, 1, 2].map(|d| matrices[d].nrows());
     // nalgebra is column-major: an (x, y, z) array in C order is a matrix with a row for each z and a column for each (x, y).
     out.resize(m2 * n1 * n0, 0.0);
-    DMatrixViewMut::from_slice(out, m2, n1 * n0).gemm(
-        1.0,
-        &matrices[2],
-        &DMatrixView::from_slice(u, n2, n1 * n0),
-        0.0,
-    );
+    let u = DMatrixView::from_slice(u, n2, n1 * n0);
+    DMatrixViewMut::from_slice(out, m2, n1 * n0).gemm(1.0, &matrices[2], &u, 0.0);
     scratch.resize(m2 * m1 * n0, 0.0);
-    let across = matrices[1].transpose();
     for (source, target) in out.chunks_exact(m2 * n1).zip(scratch.chunks_exact_mut(m2 * m1)) {
-        DMatrixViewMut::from_slice(target, m2, m1).gemm(
-            1.0,
-            &DMatrixView::from_slice(source, m2, n1),
-            &across,
-            0.0,
-        );
+        let source = DMatrixView::from_slice(source, m2, n1);
+        DMatrixViewMut::from_slice(target, m2, m1).gemm(1.0, &source, &transposed[1], 0.0);
     }
     out.resize(m2 * m1 * m0, 0.0);
-    let across = matrices[0].transpose();
-    DMatrixViewMut::from_slice(out, m2 * m1, m0).gemm(
-        1.0,
-        &DMatrixView::from_slice(scratch, m2 * m1, n0),
-        &across,
-        0.0,
-    );
-    out
+    let scratch = DMatrixView::from_slice(scratch, m2 * m1, n0);
+    DMatrixViewMut::from_slice(out, m2 * m1, m0).gemm(1.0, &scratch, &transposed[0], 0.0);
 }
 
 /// The stiffness and the mass matrix of one axis.
@@ -150,18 +139,28 @@ fn pencil(samples: &[Sample]) -> [DMatrix<f64>; 2] {
     [stiffness, mass]
 }
 
-/// Solves K v = λ M v on the free coefficients: V (n × free) with VᵀMV = 1, and λ.
-fn eigen([stiffness, mass]: &[DMatrix<f64>; 2], free: &Range<usize>) -> Result<(DMatrix<f64>, Vec<f64>)> {
-    let block = |m: &DMatrix<f64>| m.view((free.start, free.start), (free.len(), free.len())).into_owned();
-    let singular = || Error::Internal("the mass matrix of the warp map is not positive definite".into());
-    let lower = block(mass).cholesky().ok_or_else(singular)?.unpack();
-    let half = lower.solve_lower_triangular(&block(stiffness)).ok_or_else(singular)?;
-    let whole = lower.solve_lower_triangular(&half.transpose()).ok_or_else(singular)?;
-    let eigen = SymmetricEigen::new(0.5 * (&whole + whole.transpose()));
-    let vectors = lower.tr_solve_lower_triangular(&eigen.eigenvectors).ok_or_else(singular)?;
-    let mut padded = DMatrix::zeros(mass.nrows(), free.len());
-    padded.view_mut((free.start, 0), (free.len(), free.len())).copy_from(&vectors);
-    Ok((padded, eigen.eigenvalues.iter().copied().collect()))
+/// The solutions of K v = λ M v on the free coefficients of one axis.
+struct Modes {
+    /// V (n × free) with VᵀMV = 1.
+    vectors: DMatrix<f64>,
+    /// λ.
+    values: Vec<f64>,
+}
+
+impl Modes {
+    fn new([stiffness, mass]: &[DMatrix<f64>; 2], free: &Range<usize>) -> Result<Modes> {
+        let block =
+            |m: &DMatrix<f64>| m.view((free.start, free.start), (free.len(), free.len())).into_owned();
+        let singular = || Error::Internal("the mass matrix of the warp map is not positive definite".into());
+        let lower = block(mass).cholesky().ok_or_else(singular)?.unpack();
+        let half = lower.solve_lower_triangular(&block(stiffness)).ok_or_else(singular)?;
+        let whole = lower.solve_lower_triangular(&half.transpose()).ok_or_else(singular)?;
+        let eigen = SymmetricEigen::new(0.5 * (&whole + whole.transpose()));
+        let free_vectors = lower.tr_solve_lower_triangular(&eigen.eigenvectors).ok_or_else(singular)?;
+        let mut vectors = DMatrix::zeros(mass.nrows(), free.len());
+        vectors.view_mut((free.start, 0), (free.len(), free.len())).copy_from(&free_vectors);
+        Ok(Modes { vectors, values: eigen.eigenvalues.iter().copied().collect() })
+    }
 }
 
 #[cfg(test)]

@@ -131,7 +131,7 @@ impl MapReport {
     pub(super) fn measure(map: &WarpMap, field: &Heightfield, method: MapMethod) -> MapReport {
         let (cells, cell, origin) = (map.cells(), map.cell(), map.origin());
         let axes: [MapAxis; 3] = std::array::from_fn(|d| MapAxis { cells: cells[d], cell: cell[d] });
-        let fine = Assembly::new(axes, Rule::Thirds, |_| 1.0, 1.0);
+        let mut fine = Assembly::new(axes, Rule::Thirds, |_| 1.0, 1.0);
         let (min_determinant, inverted_points, at) = fine.determinants(&coefficients_of(map, &axes));
         let mut report = MapReport {
             method,

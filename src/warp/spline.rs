@@ -265,7 +265,7 @@ const MAX_CELLS: usize = 1_000_000;
 const CELLS: RangeInclusive<usize> = 4..=512;
 
 /// Cells, origin and size of the box over a rectangle, checked.
-fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
+pub(super) fn checked_box(extent: [f64; 4], spec: &MapSpec) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
     let [x_min, x_max, y_min, y_max] = extent;
     let size = [x_max - x_min, y_max - y_min, spec.thickness];
     if !size.iter().all(|s| s.is_finite() && *s > 0.0) {
