@@ -3,7 +3,6 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::time::Instant;
 
 use crate::Result;
@@ -15,7 +14,7 @@ use crate::plan::sampled::Provenance;
 use crate::planner::derivatives::{self, DerivativeError};
 use crate::planner::{self, GaitProblem, Host, Motion, Progress, Task};
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
-use crate::terrain::{self, Ground};
+use crate::terrain::{self, Ground, Surfaces};
 use crate::trajectory::Gait;
 use crate::warp::{self, MapProgress, MapReport, WarpMap};
 
@@ -90,8 +89,8 @@ pub struct Prepared {
     pub gait: Gait,
     /// The ground and how it came about.
     pub ground: Ground,
-    /// The ground's surface, shared by all models.
-    pub surface: Arc<Heightfield>,
+    /// Its surfaces, shared by all models.
+    pub surfaces: Surfaces,
 }
 
 impl Prepared {
@@ -101,22 +100,25 @@ impl Prepared {
     /// For input that is wrong or files that cannot be read.
     pub fn new(loaded: &LoadedScenario, observer: &mut Observer) -> Result<Self> {
         let scenario = &loaded.scenario;
-        let gait = Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
+        // Refused before the terrain is read.
+        Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
         // A request to stop takes effect at the first iteration.
         let _ = observer(&Event::Step(Step::Terrain));
-        let ground = terrain::build(&scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+        let ground = terrain::build(scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
         loaded.ensure_inside(ground.field.extent())?;
         for note in &ground.report.notes {
             let _ = observer(&Event::Note(&format!("terrain: {note}")));
         }
-        let surface = Arc::new(ground.field.clone());
-        Ok(Self { gait, ground, surface })
+        let surfaces = Surfaces::of(scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
+        let gait =
+            planner::choose_gait(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
+        Ok(Self { gait, ground, surfaces })
     }
 
     /// What the planner is given.
     pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
         let (scenario, robot) = (&loaded.scenario, &loaded.robot);
-        Task { scenario, robot, gait: &self.gait, ground: &self.surface, map }
+        Task { scenario, robot, gait: &self.gait, surfaces: &self.surfaces, map }
     }
 }
 
@@ -153,7 +155,7 @@ pub fn run(
     let map = match scenario.formulation {
         Formulation::Direct => None,
         Formulation::Warped | Formulation::Hybrid => {
-            match build_map(&prepared.surface, &scenario.map, true, observer)? {
+            match build_map(&prepared.surfaces.posture, &scenario.map, true, observer)? {
                 Some(built) => {
                     built.report.ensure_injective()?;
                     built.report_warnings(observer);

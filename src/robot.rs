@@ -18,6 +18,9 @@ const SHIPPED: &[(&str, &str)] = &[
     ("anymal_c", include_str!("../robots/anymal_c.toml")),
 ];
 
+/// Radius of a foot, in standing heights, where it is not known.
+const TYPICAL_FOOT: f64 = 0.07;
+
 /// `[robot]` of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -125,6 +128,26 @@ impl Robot {
     /// Names of its feet, in their order.
     pub fn foot_names(&self) -> Vec<&str> {
         self.feet.iter().map(|foot| foot.name.as_str()).collect()
+    }
+
+    /// Height of the center of mass above the feet at rest, m.
+    pub fn standing_height(&self) -> f64 {
+        -self.feet.iter().map(|foot| foot.nominal[2]).sum::<f64>() / self.feet.len() as f64
+    }
+
+    /// Radius of the largest foot, m; a typical one for the robot's height if its file describes no leg.
+    pub fn foot_radius(&self) -> f64 {
+        self.largest(|leg| leg.foot_radius).unwrap_or(TYPICAL_FOOT * self.standing_height())
+    }
+
+    /// Radius of the largest knee, m, as for the feet.
+    pub fn knee_radius(&self) -> f64 {
+        self.largest(|leg| leg.knee_radius).unwrap_or(2.0 * TYPICAL_FOOT * self.standing_height())
+    }
+
+    /// The largest of a length of the legs; none if it is zero, or no leg is described.
+    fn largest(&self, length: impl Fn(&Leg) -> f64) -> Option<f64> {
+        self.feet.iter().filter_map(|foot| foot.leg.as_ref()).map(length).reduce(f64::max).filter(|l| *l > 0.0)
     }
 
     fn from_document(document: &Document) -> Result<Self> {

@@ -12,6 +12,7 @@ use warpgait::planner::problem::Choice;
 use warpgait::planner::{GaitProblem, derivatives, guess};
 use warpgait::robot::Robot;
 use warpgait::scenario::Scenario;
+use warpgait::terrain::Surfaces;
 use warpgait::trajectory::{Gait, Spaces};
 use warpgait::warp::WarpMap;
 
@@ -41,13 +42,13 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     );
     let scenario: Scenario = toml::from_str(&text).expect("a scenario");
     let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
-    let ground = warpgait::terrain::build(&scenario.terrain, ".".as_ref()).expect("a ground");
+    let ground = warpgait::terrain::build(&scenario, ".".as_ref()).expect("a ground");
     let field = Arc::new(ground.field);
     // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
     let map = bent(&WarpMap::shear(&field, &scenario.map).expect("a map"));
     let spaces = Spaces::of(scenario.formulation, Some(Arc::new(map))).expect("spaces");
     let gait = Gait::of(&scenario, &robot).expect("a gait");
-    let model = Model::new(&scenario, &robot, &gait, field, spaces);
+    let model = Model::new(&scenario, &robot, &gait, Surfaces::one(field), spaces);
     let x = guess::guess(&scenario, &model).expect("a guess");
     GaitProblem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
 }

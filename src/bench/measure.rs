@@ -73,7 +73,7 @@ fn map_alone(loaded: &LoadedScenario, mut stopwatch: Stopwatch) -> Result<Measur
     let mut silent = |_: &Event| ControlFlow::Continue(());
     let prepared = Prepared::new(loaded, &mut silent)?;
     stopwatch.begin(Step::Map);
-    let built = pipeline::build_map(&prepared.surface, &loaded.scenario.map, false, &mut silent)?;
+    let built = pipeline::build_map(&prepared.surfaces.posture, &loaded.scenario.map, false, &mut silent)?;
     let BuiltMap { map, report, cached } = built.ok_or_else(interrupted)?;
     let cpu = stopwatch.stop();
     let map = MapMeasured { cached, report, ground_errors: ground_errors(&map) };

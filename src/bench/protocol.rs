@@ -353,7 +353,7 @@ mod tests {
                     let coarse = ["terrain.spacing=0.2".into()];
                     let loaded =
                         scenario::load_text(&case.name, &case.scenario, ".".as_ref(), &coarse).unwrap();
-                    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir);
+                    let ground = terrain::build(&loaded.scenario, &loaded.base_dir);
                     assert!(ground.is_ok(), "{}", case.name);
                 }
             }

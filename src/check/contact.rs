@@ -1,28 +1,33 @@
 //! Feet and forces: on the ground in stance, above it in swing, forces within their cones and limits.
 
 use super::laws;
+use super::patches::{PlanPatch, patch_at, stance_numbers};
 use super::subject::{Finding, Residuals, Subject, Worst};
 use super::vector::{dot, norm, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
-    feet(s, findings, residuals);
-    swings(s, findings);
-    forces(s, findings, residuals);
-    footholds(s, findings);
+    let stances: Vec<_> = (0..s.feet).map(|e| stance_numbers(s, e)).collect();
+    feet(s, &stances, findings, residuals);
+    swings(s, &stances, findings);
+    forces(s, &stances, findings, residuals);
+    footholds(s, &stances, findings);
 }
 
-/// Height of a foot above the ground, m.
-fn height_over_ground(s: &Subject, n: usize, e: usize) -> f64 {
+/// Height of a foot above the ground, m; for a foot that stands on a patch, above that patch's plane.
+fn height_over_ground(s: &Subject, stances: &[Vec<usize>], n: usize, e: usize) -> f64 {
     let [x, y, z] = s.foot_position(n, e);
-    z - s.ground.height(x, y)
+    match patch_at(s, &stances[e], n, e) {
+        Some(patch) => z - patch.height(x, y),
+        None => z - s.ground.height(x, y),
+    }
 }
 
-fn feet(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+fn feet(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let (mut gap, mut slip, mut penetration) = (Worst::default(), Worst::default(), Worst::default());
     let mut landed = vec![None; s.feet];
     residuals.stance_gap = vec![0.0; s.samples];
     for (n, e) in s.sample_feet() {
-        let over = 1e3 * height_over_ground(s, n, e);
+        let over = 1e3 * height_over_ground(s, stances, n, e);
         if s.in_contact(n, e) {
             gap.meet(over.abs(), n, Some(e));
             residuals.stance_gap[n] = residuals.stance_gap[n].max(over.abs());
@@ -39,7 +44,7 @@ fn feet(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
 }
 
 /// The apex of every swing that begins and ends within the plan.
-fn swings(s: &Subject, findings: &mut Vec<Finding>) {
+fn swings(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
     let clearance = 1e3 * s.scenario.motion.swing_clearance;
     let mut shortfall = Worst::default();
     let mut least: Option<Worst> = None;
@@ -51,7 +56,7 @@ fn swings(s: &Subject, findings: &mut Vec<Finding>) {
                 n += 1;
             }
             if begin > 0 && n > begin && n < s.samples {
-                let heights = (begin..n).map(|k| (1e3 * height_over_ground(s, k, e), k));
+                let heights = (begin..n).map(|k| (1e3 * height_over_ground(s, stances, k, e), k));
                 let (apex, at) = heights
                     .fold((f64::NEG_INFINITY, begin), |best, one| if one.0 > best.0 { one } else { best });
                 shortfall.meet(clearance - apex, at, Some(e));
@@ -67,7 +72,7 @@ fn swings(s: &Subject, findings: &mut Vec<Finding>) {
 }
 
 /// The cone of Eq. 5 with the terrain's own normals, limits along the normal, nothing in swing.
-fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
+fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let motion = &s.scenario.motion;
     let percent = 100.0 / s.weight;
     let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
@@ -76,10 +81,14 @@ fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     for (n, e) in s.sample_feet() {
         let force = s.foot_force(n, e);
         let [x, y, _] = s.foot_position(n, e);
-        let normal = s.ground.normal(x, y);
+        let patch = patch_at(s, &stances[e], n, e);
+        let normal = patch.as_ref().map_or_else(|| s.ground.normal(x, y), PlanPatch::normal);
         let stated = s.plan.foot_normal[n * s.feet + e];
-        // For small angles the chord between two unit vectors is more accurate than the cosine.
-        normals.meet((2.0 * (0.5 * norm(sub(normal, stated))).min(1.0).asin()).to_degrees(), n, Some(e));
+        // In the air over edges, the raw ground has no normal to speak of, and nothing depends on it.
+        if patch.is_some() || !s.has_edges() {
+            // For small angles the chord between two unit vectors is more accurate than the cosine.
+            normals.meet((2.0 * (0.5 * norm(sub(normal, stated))).min(1.0).asin()).to_degrees(), n, Some(e));
+        }
         if !s.in_contact(n, e) {
             swing.meet(percent * norm(force), n, Some(e));
             continue;
@@ -105,7 +114,7 @@ fn forces(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
 }
 
 /// Where feet may stand: within the terrain, and not on slopes that the scenario rules out.
-fn footholds(s: &Subject, findings: &mut Vec<Finding>) {
+fn footholds(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
     let [x_min, x_max, y_min, y_max] = s.ground.extent();
     let (mut outside, mut steep) = (Worst::default(), Worst::default());
     for (n, e) in s.sample_feet().filter(|&(n, e)| s.in_contact(n, e)) {
@@ -117,7 +126,11 @@ fn footholds(s: &Subject, findings: &mut Vec<Finding>) {
         if let Some(most) = s.scenario.contact.max_slope {
             let margin = s.scenario.contact.edge_margin;
             for [u, v] in [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-                let normal = s.ground.normal(x + margin * u, y + margin * v);
+                let patch = patch_at(s, &stances[e], n, e);
+                let normal = patch.map_or_else(
+                    || s.ground.normal(x + margin * u, y + margin * v),
+                    |patch| patch.normal(),
+                );
                 steep.meet(normal[0].hypot(normal[1]) / normal[2] - most, n, Some(e));
             }
         }

@@ -1,4 +1,5 @@
-//! The terrain under the plan, from the plan's own height grid: a C² bicubic spline through the samples.
+//! The terrain under the plan, from the plan's own height grid: a C² bicubic spline through the samples, or, where the plan has
+//! patches because the ground has edges, the raw samples and a bilinear surface between them.
 //!
 //! Written for the check alone, so that an error in the planner's heightfield cannot hide itself.
 
@@ -12,11 +13,20 @@ pub struct PlanGround {
     coefficients: Vec<f64>,
     rows: usize,
     columns: usize,
+    /// Heights of the bilinear surface, if it is one: `raw[row * (columns − 2) + column]`.
+    raw: Option<Vec<f64>>,
 }
 
 impl PlanGround {
+    /// The bilinear surface through the raw heights.
+    pub fn with_edges(grid: &GroundGrid) -> Self {
+        let raw = Some(grid.raw.as_ref().unwrap_or(&grid.height).clone());
+        let (rows, columns) = (grid.rows + 2, grid.columns + 2);
+        Self { origin: grid.origin, spacing: grid.spacing, coefficients: Vec::new(), rows, columns, raw }
+    }
+
     /// Fits the spline: along the rows, then along the columns.
-    pub fn new(grid: &GroundGrid) -> Self {
+    pub fn smooth(grid: &GroundGrid) -> Self {
         let (rows, columns) = (grid.rows + 2, grid.columns + 2);
         let mut along_x = vec![0.0; grid.rows * columns];
         for row in 0..grid.rows {
@@ -30,7 +40,7 @@ impl PlanGround {
                 coefficients[row * columns + column] = value;
             }
         }
-        Self { origin: grid.origin, spacing: grid.spacing, coefficients, rows, columns }
+        Self { origin: grid.origin, spacing: grid.spacing, coefficients, rows, columns, raw: None }
     }
 
     /// x_min, x_max, y_min, y_max of the grid, m.
@@ -62,6 +72,12 @@ impl PlanGround {
     fn evaluate(&self, x: f64, y: f64) -> (f64, f64, f64) {
         let (column, u) = cell((x - self.origin[0]) / self.spacing[0], self.columns - 2);
         let (row, v) = cell((y - self.origin[1]) / self.spacing[1], self.rows - 2);
+        if let Some(raw) = &self.raw {
+            let at = |i: usize, j: usize| raw[(row + j) * (self.columns - 2) + column + i];
+            let [low, high] = [0, 1].map(|j| at(0, j) * (1.0 - u) + at(1, j) * u);
+            let hx = (at(1, 0) - at(0, 0)) * (1.0 - v) + (at(1, 1) - at(0, 1)) * v;
+            return (low * (1.0 - v) + high * v, hx / self.spacing[0], (high - low) / self.spacing[1]);
+        }
         let (bu, du) = basis(u);
         let (bv, dv) = basis(v);
         let (mut h, mut hx, mut hy) = (0.0, 0.0, 0.0);
@@ -145,7 +161,7 @@ mod tests {
     #[test]
     fn cubics_are_reproduced() {
         let h = |x: f64, y: f64| 0.3 + x - 0.5 * y + x * x * y - 0.2 * x * x * x * y * y * y;
-        let ground = PlanGround::new(&sampled(9, 0.25, h));
+        let ground = PlanGround::smooth(&sampled(9, 0.25, h));
         for (x, y) in [(-1.0, -1.0), (0.13, -0.61), (0.99, 0.37), (1.0, 1.0), (-0.97, 0.95)] {
             assert!((ground.height(x, y) - h(x, y)).abs() < 1e-12);
             let d = 1e-6;
@@ -158,7 +174,7 @@ mod tests {
     #[test]
     fn ripples_are_met_to_a_hundredth_of_a_millimeter() {
         let h = |x: f64, y: f64| 0.25 * (2.618 * x).sin() * (2.618 * y).sin();
-        let ground = PlanGround::new(&sampled(51, 0.04, h));
+        let ground = PlanGround::smooth(&sampled(51, 0.04, h));
         let worst = (0..2000)
             .map(|i| (-1.0 + (i * 37 % 2000) as f64 / 1000.0, -1.0 + (i * 91 % 2000) as f64 / 1000.0))
             .map(|(x, y)| (ground.height(x, y) - h(x, y)).abs())
@@ -176,7 +192,7 @@ mod tests {
             height: vec![0.0, 1.0, 2.0, 1.0, 2.0, 3.0],
             raw: None,
         };
-        let ground = PlanGround::new(&grid);
+        let ground = PlanGround::smooth(&grid);
         assert!((ground.height(0.5, 0.5) - 1.0).abs() < 1e-12);
         assert!((ground.height(1.7, 0.1) - 1.8).abs() < 1e-12);
         assert!(ground.covers(2.0, 1.0) && !ground.covers(2.1, 0.5));

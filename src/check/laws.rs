@@ -58,6 +58,12 @@ laws! {
         "the torso's underside keeps motion.base_clearance from the ground (allowance: 0.2 mm)";
     FOOTHOLD_SLOPE = "foothold_slope", "1", Some(0.01), None, "slope of a foothold beyond contact.max_slope";
     INSIDE = "inside", "mm", Some(0.0), None, "distance of a standing foot beyond the edge of the terrain";
+    PATCH = "patch", "mm", Some(1.0), None, "distance of a standing foot beyond the sides of its patch";
+    PATCH_COUNT = "patch_count", "1", Some(0.0), None, "every stance has a patch";
+    PATCH_ROUGHNESS = "patch_roughness", "mm", Some(15.0), None,
+        "difference of the raw ground under a standing foot from the plane of its patch";
+    SWING_EDGE = "swing_edge", "mm", Some(0.1), None,
+        "a swinging foot, as a ball, stays above the raw ground (allowance for rounding: 0.1 mm)";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
     GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given";

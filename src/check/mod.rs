@@ -8,6 +8,7 @@ mod dynamics;
 mod ground;
 mod laws;
 mod motion;
+mod patches;
 mod subject;
 mod vector;
 
@@ -49,6 +50,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     let mut findings = Vec::new();
     dynamics::findings(&subject, &mut findings, &mut residuals);
     contact::findings(&subject, &mut findings, &mut residuals);
+    patches::findings(&subject, &mut findings);
     motion::findings(&subject, &mut findings, &mut residuals);
 
     let (mut rows, mut figures) = (Vec::new(), Vec::new());

@@ -60,7 +60,11 @@ impl<'a> Subject<'a> {
         Ok(Self {
             plan,
             scenario,
-            ground: PlanGround::new(&plan.ground),
+            ground: if plan.patches.is_empty() {
+                PlanGround::smooth(&plan.ground)
+            } else {
+                PlanGround::with_edges(&plan.ground)
+            },
             samples,
             feet: plan.foot_names.len(),
             step,
@@ -78,6 +82,11 @@ impl<'a> Subject<'a> {
 
     pub fn in_contact(&self, n: usize, e: usize) -> bool {
         self.plan.foot_contact[n * self.feet + e]
+    }
+
+    /// Whether the ground has edges, so that feet stand on patches.
+    pub fn has_edges(&self) -> bool {
+        !self.plan.patches.is_empty()
     }
 
     /// All pairs of sample and foot.

@@ -16,6 +16,7 @@ use crate::pipeline::{self, BuiltMap, Event};
 use crate::report::map_table;
 use crate::scenario;
 use crate::warp::{MapReport, WarpMap};
+use crate::terrain::Surfaces;
 use crate::{Error, Result, terrain};
 
 const EXAMPLES: &str = "\
@@ -48,20 +49,22 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     }
     let loaded = scenario::load(&arguments.scenario, &arguments.set)?;
     listen_for_ctrl_c()?;
-    let ground = terrain::build(&loaded.scenario.terrain, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    let surfaces = Surfaces::of(&loaded.scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
+    let surface = &surfaces.posture;
     let mut progress = ProgressLine::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
     let mut show = |event: &Event| {
         progress.show(event);
         ControlFlow::Continue(())
     };
-    let built = pipeline::build_map(&ground.field, &loaded.scenario.map, !arguments.no_cache, &mut show)?;
+    let built = pipeline::build_map(surface, &loaded.scenario.map, !arguments.no_cache, &mut show)?;
     let Some(built) = built else { return Ok(Ending::Interrupted) };
     built.report_warnings(&mut show);
     drop(progress);
     let BuiltMap { map, report, cached } = &built;
     if let Some(output) = &arguments.output {
-        write(output, map, &ground.field, report)?;
+        write(output, map, surface, report)?;
     }
     let sound = report.converged && report.inverted_points == 0;
     console.result(&map_table(report, *cached));

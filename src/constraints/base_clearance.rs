@@ -45,7 +45,7 @@ impl BaseClearance {
 fn point(model: &Model, base: &BaseNode, b: &Vector3<f64>) -> (Vector3<f64>, HeightJet, f64, Vector3<f64>) {
     let arm = base.rotation() * b;
     let q = base.position() + arm;
-    let ground = model.ground.jet(q.x, q.y);
+    let ground = model.surfaces.feet.jet(q.x, q.y);
     (arm, ground, q.z - ground.h, Vector3::new(-ground.d1[0], -ground.d1[1], 1.0))
 }
 

@@ -43,7 +43,7 @@ impl FootholdSlope {
 }
 
 fn ground(model: &Model, contact: &FootNode, d: [f64; 2]) -> HeightJet {
-    model.ground.jet(contact.point.position.x + d[0], contact.point.position.y + d[1])
+    model.surfaces.feet.jet(contact.point.position.x + d[0], contact.point.position.y + d[1])
 }
 
 /// ∇(‖∇h‖²) in the ambient position.

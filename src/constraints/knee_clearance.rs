@@ -5,9 +5,11 @@
 //! ```
 //!
 //! v(r) is a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]: the knee with its radius, and the
-//! shank's outermost corner. Legs that the robot's file does not describe have no rows.
+//! shank's outermost corner. Over ground with edges, n_z is left out, h is the surface over which a ball of the knee's or the
+//! foot's size rolls, and near edges further points between the corner and the foot are constrained: an edge can reach
+//! between corner and foot. Legs that the robot's file does not describe have no rows.
 //!
-//! Rows: knee, corner for each foot at every `STRIDE`-th sample, m.
+//! Rows: knee, corner for each foot at every `STRIDE`-th sample; near edges knee, corner and further points at every sample; m.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,40 +18,95 @@ use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
-use crate::nlp::ground_normal::distance;
+use crate::nlp::ground_normal::clearance;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::{PoseTangent, Tangent};
 use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
+use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::cross_matrix;
 
 /// Every how many samples there are rows.
 const STRIDE: usize = 2;
 
+/// Near edges, further points of the shank: fractions of the way from its corner to the foot.
+const ALONG_SHANK: [f64; 5] = [0.17, 0.34, 0.51, 0.68, 0.85];
+
 /// The clearance of knees and shanks.
 #[derive(Clone, Debug)]
 pub struct KneeClearance {
-    places: Vec<(usize, Instant, Leg)>,
+    places: Vec<LegPlace>,
+    /// First row of each place, and the number of rows.
+    offsets: Vec<usize>,
+}
+
+/// A leg at an instant.
+#[derive(Clone, Copy, Debug)]
+struct LegPlace {
+    foot: usize,
+    at: Instant,
+    leg: Leg,
+    near_edge: bool,
 }
 
 impl KneeClearance {
     /// Over the whole motion.
     pub fn new(model: &Model) -> Self {
         let mut places = Vec::new();
-        for (i, leg) in model.legs.iter().enumerate() {
-            if let Some(leg) = leg {
-                places.extend((0..=model.layout.intervals).step_by(STRIDE).map(|k| (i, k.into(), *leg)));
+        for (foot, leg) in model.legs.iter().enumerate() {
+            let Some(leg) = *leg else { continue };
+            for k in 0..=model.layout.intervals {
+                let near_edge = is_near_edge(model, foot, k, leg.shank);
+                if near_edge || k % STRIDE == 0 {
+                    places.push(LegPlace { foot, at: k.into(), leg, near_edge });
+                }
             }
         }
-        Self { places }
+        let mut offsets = vec![0];
+        for place in &places {
+            offsets.push(offsets[offsets.len() - 1] + place.rows());
+        }
+        Self { places, offsets }
+    }
+
+    /// The places with their first rows.
+    fn numbered(&self) -> impl Iterator<Item = (&LegPlace, usize)> {
+        self.places.iter().zip(self.offsets.iter().copied())
     }
 }
 
-/// The points v(r).
-fn points<T: Scalar>(leg: &Leg, r: [T; 3]) -> [[T; 3]; 2] {
-    let posture = leg.posture(r);
-    [posture.knee(), posture.on_shank(leg.corner)]
+/// Whether the foot's shank is over an edge at a sample: near one of its footholds there is ground on which no foot can stand.
+fn is_near_edge(model: &Model, foot: usize, k: usize, shank: f64) -> bool {
+    let Some(contact) = &model.surfaces.contact else { return false };
+    let stances = match model.layout.phase[foot][k] {
+        Phase::Stance(j) => j..=j,
+        Phase::Swing(j) => j..=j + 1,
+    };
+    let mut patches = stances.filter_map(|j| model.patch(foot, j));
+    patches.any(|patch| contact.has_edge_within(patch.center, shank))
+}
+
+impl LegPlace {
+    fn rows(&self) -> usize {
+        if self.near_edge { 2 + ALONG_SHANK.len() } else { 2 }
+    }
+
+    /// The points v(r): knee, corner, and near edges the others.
+    fn points<T: Scalar>(&self, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
+        let Leg { corner, shank, .. } = self.leg;
+        let posture = self.leg.posture(r);
+        let toward_foot = move |s: &f64| [corner[0] + s * (shank - corner[0]), (1.0 - s) * corner[1]];
+        let others = if self.near_edge { &ALONG_SHANK[..] } else { &[] };
+        let on_shank = [[0.0, 0.0], corner].into_iter().chain(others.iter().map(toward_foot));
+        on_shank.map(move |point| posture.on_shank(point))
+    }
+}
+
+/// How far a point of the shank is above the surface for it, with the derivatives in q.
+fn above_ground(model: &Model, q: &Vector3<f64>, point: usize) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let surface = if point == 0 { &model.surfaces.knees } else { &model.surfaces.feet };
+    clearance(model, q, &surface.jet(q.x, q.y))
 }
 
 /// A point and how it moves: dq = by_turn δ + by_base dp + by_foot dp_i.
@@ -66,7 +123,12 @@ struct Moved {
 }
 
 impl Moved {
-    fn new(model: &Model, state: &State, (i, at): (usize, Instant), local: [Jet; 3]) -> Self {
+    fn new(
+        model: &Model,
+        state: &State,
+        (i, at): (usize, Instant),
+        (point, local): (usize, [Jet; 3]),
+    ) -> Self {
         let base = state.base_at(at);
         let rotation = base.rotation();
         let out = rotation * Vector3::from_fn(|c, _| local[c].value);
@@ -76,7 +138,7 @@ impl Moved {
         let arm = cross_matrix(&foot_in_base::arm(model, state, (i, at)));
         Self {
             local,
-            distance: distance(&q, &model.ground.jet(q.x, q.y)),
+            distance: above_ground(model, &q, point),
             with_foot,
             arm,
             by_turn: with_foot * arm - cross_matrix(&out),
@@ -88,11 +150,11 @@ impl Moved {
     }
 }
 
-impl KneeClearance {
-    fn moved(&self, model: &Model, state: &State, place: usize) -> [Moved; 2] {
-        let (i, at, leg) = &self.places[place];
-        let r = foot_in_base::value(model, state, (*i, *at));
-        points(leg, Jet::variables(&r)).map(|local| Moved::new(model, state, (*i, *at), local))
+impl LegPlace {
+    fn moved(&self, model: &Model, state: &State) -> impl Iterator<Item = Moved> {
+        let at = (self.foot, self.at);
+        let r = foot_in_base::value(model, state, at);
+        self.points(Jet::variables(&r)).enumerate().map(move |point| Moved::new(model, state, at, point))
     }
 }
 
@@ -102,33 +164,35 @@ impl Constraint for KneeClearance {
     }
 
     fn rows(&self) -> usize {
-        2 * self.places.len()
+        self.offsets[self.places.len()]
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        for (rows, (_, _, leg)) in lower.chunks_exact_mut(2).zip(&self.places) {
-            rows.copy_from_slice(&[leg.knee_radius + margins::KNEE_CLEARANCE, margins::KNEE_CLEARANCE]);
+        lower.fill(margins::KNEE_CLEARANCE);
+        for (place, first) in self.numbered() {
+            lower[first] += place.leg.knee_radius;
         }
         upper.fill(f64::INFINITY);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, (i, at, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let (base, r) = (state.base_at(*at), foot_in_base::value(model, state, (*i, *at)));
-            for (row, local) in rows.iter_mut().zip(points(leg, r.into())) {
+        for (place, first) in self.numbered() {
+            let base = state.base_at(place.at);
+            let r = foot_in_base::value(model, state, (place.foot, place.at));
+            for (point, local) in place.points(r.into()).enumerate() {
                 let q = base.position() + base.rotation() * Vector3::from(local);
-                *row = distance(&q, &model.ground.jet(q.x, q.y)).0;
+                out[first + point] = above_ground(model, &q, point).0;
             }
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for place in 0..self.places.len() {
-            let (i, at, _) = self.places[place];
+        for (place, offset) in self.numbered() {
+            let (i, at) = (place.foot, place.at);
             let pose = PoseTangent::new(model, state, at);
             let foot = Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at));
-            for (j, moved) in self.moved(model, state, place).iter().enumerate() {
-                let (row, by_q) = (first + 2 * place + j, moved.distance.1);
+            for (point, moved) in place.moved(model, state).enumerate() {
+                let (row, by_q) = (first + offset + point, moved.distance.1);
                 let (by_turn, by_base) = (moved.by_turn.tr_mul(&by_q), moved.by_base().tr_mul(&by_q));
                 pose.add_along(&by_turn, &by_base, &mut sink.row(row));
                 foot.add_along(&moved.with_foot.tr_mul(&by_q), &mut sink.row(row));
@@ -144,10 +208,10 @@ impl Constraint for KneeClearance {
         curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
-        for (place, lambda) in multipliers.chunks_exact(2).enumerate() {
-            let (i, at, _) = self.places[place];
+        for (place, first) in self.numbered() {
+            let (i, at) = (place.foot, place.at);
             let rotation = state.base_at(at).rotation();
-            for (moved, lambda) in self.moved(model, state, place).iter().zip(lambda) {
+            for (moved, lambda) in place.moved(model, state).zip(&multipliers[first..]) {
                 // The ground's curvature, and the normal's.
                 let q = moved.distance.2 * *lambda;
                 let (by_turn, by_base, by_foot) = (moved.by_turn, moved.by_base(), moved.with_foot);
@@ -174,7 +238,7 @@ impl Constraint for KneeClearance {
     }
 
     fn place(&self, row: usize) -> RowPlace {
-        let (i, at, _) = self.places[row / 2];
-        RowPlace { foot: Some(i), sample: at.time() }
+        let place = &self.places[self.offsets.partition_point(|&first| first <= row) - 1];
+        RowPlace { foot: Some(place.foot), sample: place.at.time() }
     }
 }

@@ -7,6 +7,7 @@
 pub mod base_clearance;
 pub mod durations;
 pub mod dynamics;
+pub mod foothold_patch;
 pub mod foothold_slope;
 pub mod friction;
 pub mod friction_conformal;

@@ -4,20 +4,21 @@
 //!   (zᵀp_i − h(p_i)) n_z ≥ clearance
 //! ```
 //!
-//! The left side is the distance to the tangent plane of the ground below the foot. In the middle of a swing the clearance
+//! The left side is the distance to the tangent plane of the ground below the foot; over ground with edges it is the height above the
+//! surface that the foot rolls over, without n_z. In the middle of a swing the clearance
 //! is the scenario's `swing_clearance`. At the samples before and after it, a fraction of it is required that falls off toward
 //! both ends like the parabola 4u(1−u), so that feet lift off and touch down steeply enough to clear stones. In F the free
 //! control points are bounded as well (see `planner::problem`).
 //!
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
-//! optimized, one for each point of the path at which a sample lies at nominal times: the path does not depend on time.
+//! optimized or the ground has edges, one for each point of the path in [`swing_points`].
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::nlp::curvature::NodeCurvature;
-use crate::nlp::ground_normal::distance;
+use crate::nlp::ground_normal::clearance;
 use crate::nlp::sink::Sink;
-use crate::nlp::state::{FootNode, swing_points};
+use crate::nlp::state::{FootNode, has_points, swing_points};
 use crate::nlp::tangent::Tangent;
 use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
@@ -48,13 +49,13 @@ impl SwingClearance {
         for (foot, variables) in model.layout.feet.iter().enumerate() {
             for (k, phase) in model.layout.phase[foot].iter().enumerate() {
                 if let Phase::Swing(j) = *phase
-                    && variables.swings[j].switches.is_none()
+                    && !has_points(model, &variables.swings[j])
                 {
                     let s = variables.swings[j].swing;
                     places.push(At::Sample { foot, k, u: (k as f64 - s.start) / (s.end - s.start) });
                 }
             }
-            for (n, at) in swing_points(&model.layout, foot).iter().enumerate() {
+            for (n, at) in swing_points(model, foot).iter().enumerate() {
                 let s = variables.swings[at.swing].swing;
                 let sample = s.start + at.u * (s.end - s.start);
                 places.push(At::Point { foot, n, u: at.u, apex: at.apex, sample });
@@ -70,9 +71,9 @@ impl SwingClearance {
         }
     }
 
-    fn distance(&self, state: &State, at: At) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    fn distance(&self, model: &Model, state: &State, at: At) -> (f64, Vector3<f64>, Matrix3<f64>) {
         let foot = self.node(state, at).0;
-        distance(&foot.point.position, &foot.ground)
+        clearance(model, &foot.point.position, &foot.ground)
     }
 }
 
@@ -95,16 +96,16 @@ impl Constraint for SwingClearance {
         }
     }
 
-    fn values(&self, _model: &Model, state: &State, out: &mut [f64]) {
+    fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
         for (value, &at) in out.iter_mut().zip(&self.places) {
-            *value = self.distance(state, at).0;
+            *value = self.distance(model, state, at).0;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::foot(model, foot, node).add_along(&self.distance(state, at).1, &mut sink.row(first + r));
+            Tangent::foot(model, foot, node).add_along(&self.distance(model, state, at).1, &mut sink.row(first + r));
         }
     }
 
@@ -118,7 +119,7 @@ impl Constraint for SwingClearance {
     ) {
         for (&lambda, &at) in multipliers.iter().zip(&self.places) {
             let (foot, node) = self.node(state, at);
-            let (_, by_position, form) = self.distance(state, at);
+            let (_, by_position, form) = self.distance(model, state, at);
             match at {
                 At::Sample { foot, k, .. } => curvature.swings[foot][k] += by_position * lambda,
                 At::Point { foot, n, .. } => curvature.points[foot][n] += by_position * lambda,

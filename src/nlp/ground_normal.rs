@@ -3,12 +3,28 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::model::Model;
 use crate::heightfield::HeightJet;
 
 /// Second derivative of the height as a form in the ambient position.
 pub fn height_form(ground: &HeightJet) -> Matrix3<f64> {
     let [xx, xy, yy] = ground.d2;
     Matrix3::new(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, 0.0)
+}
+
+/// How far a point is above one of the surfaces that bodies clear, with its gradient and Hessian in q: the distance to the tangent
+/// plane of a smooth ground. Over edges, where n_z can be close to zero, it is the height above the surface, which is a path
+/// of a ball and so contains the distance already.
+pub fn clearance(
+    model: &Model,
+    q: &Vector3<f64>,
+    surface: &HeightJet,
+) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    if model.surfaces.have_edges() {
+        let by_gap = Vector3::new(-surface.d1[0], -surface.d1[1], 1.0);
+        return (q.z - surface.h, by_gap, -height_form(surface));
+    }
+    distance(q, surface)
 }
 
 /// (zᵀq − h(q)) n_z, the distance of q to the tangent plane of the ground below it, with its gradient and Hessian in q.

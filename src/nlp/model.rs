@@ -1,13 +1,11 @@
 //! What stays the same during a solve.
 
-use std::sync::Arc;
-
 use nalgebra::{Matrix3, Vector3};
 
-use crate::heightfield::Heightfield;
 use crate::leg::Leg;
 use crate::robot::{Box3, Robot};
 use crate::scenario::Scenario;
+use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::{Gait, Layout, Spaces};
 
@@ -43,7 +41,9 @@ pub struct Model {
     /// Points of the torso's underside, base frame, m.
     pub underside: Vec<Vector3<f64>>,
     /// The ground.
-    pub ground: Arc<Heightfield>,
+    pub surfaces: Surfaces,
+    /// `patches[foot][stance]`: where each stance must be. Empty where feet may stand anywhere.
+    pub patches: Vec<Vec<Patch>>,
     /// The spaces of the variables.
     pub spaces: Spaces,
     /// The variables.
@@ -58,7 +58,7 @@ impl Model {
         scenario: &Scenario,
         robot: &Robot,
         gait: &Gait,
-        ground: Arc<Heightfield>,
+        surfaces: Surfaces,
         spaces: Spaces,
     ) -> Self {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
@@ -86,7 +86,8 @@ impl Model {
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
             foot_names,
             underside,
-            ground,
+            surfaces,
+            patches: Vec::new(),
             spaces,
             threads: scenario.solver.threads,
             layout: Layout::new(
@@ -98,6 +99,11 @@ impl Model {
                 },
             ),
         }
+    }
+
+    /// The patch of a stance, where there is one.
+    pub fn patch(&self, foot: usize, stance: usize) -> Option<&Patch> {
+        self.patches.get(foot).map(|stances| &stances[stance])
     }
 
     /// Number of feet.

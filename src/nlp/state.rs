@@ -9,8 +9,12 @@ use crate::trajectory::rotation::RotationJet;
 use crate::trajectory::space::PointJet;
 use crate::trajectory::spline::SwingBasis;
 use crate::trajectory::switches::TimedNode;
-use crate::trajectory::{Instant, Layout, LinearNode};
+use crate::trajectory::variables::SwingVariables;
+use crate::trajectory::{Instant, LinearNode};
 use crate::warp::Order;
+
+/// Over ground with edges, the path of a swing is constrained at the ends of so many intervals.
+const POINTS_OVER_EDGES: usize = 12;
 
 /// The base at a sample.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +82,7 @@ pub struct State {
     /// `swings_between[foot][k]`: halfway from each sample to the next; empty where the leg's geometry is not known, stale
     /// where the foot stands.
     pub swings_between: Vec<Vec<FootNode>>,
-    /// `points[foot]`: the middle of each swing, and where switches are variables more points of its path.
+    /// `points[foot]`: the middle of each swing, and where switches are variables or the ground has edges more points of its path.
     pub points: Vec<Vec<FootNode>>,
     /// Which points these are.
     pub swing_points: Vec<Vec<SwingPoint>>,
@@ -119,7 +123,7 @@ impl State {
         let samples = layout.intervals + 1;
         let feet = model.feet();
         let between = |i: usize| 0..if model.legs[i].is_some() { layout.intervals } else { 0 };
-        let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(layout, i)).collect();
+        let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(model, i)).collect();
         Self {
             base: vec![BaseNode { point, turn }; samples],
             base_between: vec![
@@ -156,7 +160,7 @@ impl State {
         let order = if curved { Order::Third } else { Order::Second };
         let foot_at = |node: &LinearNode, order: Order| {
             let point = model.spaces.feet.jet(&Vector3::from(node.value::<3>(x)), order);
-            FootNode { point, ground: model.ground.jet(point.position.x, point.position.y) }
+            FootNode { point, ground: model.surfaces.feet.jet(point.position.x, point.position.y) }
         };
         for (k, node) in layout.base.iter().enumerate() {
             let y = node.value::<6>(x);
@@ -172,8 +176,11 @@ impl State {
             for (swing, times) in foot.swings.iter().zip(&mut self.switches[i]) {
                 *times = swing.times(x);
             }
-            for (stance, contact) in foot.stances.iter().zip(&mut self.contacts[i]) {
+            for (j, (stance, contact)) in foot.stances.iter().zip(&mut self.contacts[i]).enumerate() {
                 *contact = foot_at(&stance.foothold, order);
+                if let Some(patch) = model.patch(i, j) {
+                    contact.ground = patch.jet(contact.point.position.x, contact.point.position.y);
+                }
                 for (k, full) in stance.free_forces() {
                     let full = Vector3::from(full.value::<3>(x));
                     self.warped_full_forces[i][k] = full;
@@ -238,17 +245,27 @@ impl State {
     }
 }
 
-/// The middle of each swing; where its switches are variables, also points where the samples would be at nominal times.
-pub(crate) fn swing_points(layout: &Layout, foot: usize) -> Vec<SwingPoint> {
+/// Whether the clearance of a foot's swing is constrained at points of its path rather than at samples: where its switches are
+/// variables, since the path does not depend on time; and where the ground has edges, which a foot can cut between samples.
+pub(crate) fn has_points(model: &Model, swing: &SwingVariables) -> bool {
+    swing.switches.is_some() || model.surfaces.have_edges()
+}
+
+/// The middle of each swing; where [`has_points`], also points where the samples would be at nominal times, and at least
+/// [`POINTS_OVER_EDGES`] intervals where the ground has edges.
+pub(crate) fn swing_points(model: &Model, foot: usize) -> Vec<SwingPoint> {
+    let layout = &model.layout;
     let mut points = Vec::new();
     for (swing, variables) in layout.feet[foot].swings.iter().enumerate() {
         let mut add = |u: f64, apex: bool| {
             points.push(SwingPoint { swing, u, apex, node: layout.swing_node(foot, swing, u, 0) });
         };
         add(0.5, true);
-        if variables.switches.is_some() {
+        if has_points(model, variables) {
             let samples = (variables.swing.end - variables.swing.start) as usize;
-            (1..samples).for_each(|k| add(k as f64 / samples as f64, false));
+            let least = if model.surfaces.have_edges() { POINTS_OVER_EDGES } else { 0 };
+            let intervals = samples.max(least);
+            (1..intervals).filter(|k| 2 * k != intervals).for_each(|k| add(k as f64 / intervals as f64, false));
         }
     }
     points

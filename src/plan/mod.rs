@@ -58,6 +58,9 @@ pub struct Plan {
     pub splines: Vec<NamedArray>,
     /// The ground as planned on.
     pub ground: GroundGrid,
+    /// `patches[foot][stance]`: the corners, in order around a rectangle of a plane, m, within which each foothold lies; empty where
+    /// feet may stand anywhere.
+    pub patches: Vec<Vec<[[f64; 3]; 4]>>,
     /// The warp map's control points, where one was used.
     pub map: Option<MapGrid>,
     /// (iterations,)
@@ -101,7 +104,7 @@ pub struct GroundGrid {
     pub origin: [f64; 2],
     /// Spacing along x, y, m.
     pub spacing: [f64; 2],
-    /// Heights, m.
+    /// Heights, m. Between the samples a C² spline; bilinear where the plan has patches, because the ground then has edges.
     pub height: Vec<f64>,
     /// The same grid before smoothing, where the input was a raster.
     pub raw: Option<Vec<f64>>,
@@ -158,6 +161,9 @@ pub struct MetaRobot {
     pub reach: Vec<Box3>,
     /// The torso's box.
     pub torso: Box3,
+    /// Radius of a foot, m; 0 in plans of version 0.1.0 and before.
+    #[serde(default)]
+    pub foot_radius: f64,
 }
 
 /// `meta.limits`: what the scenario sets, defaults included.

@@ -63,6 +63,7 @@ impl Plan {
             phase_durations: read_phases(&mut npz, e)?,
             splines: read_splines(&mut npz)?,
             ground: read_ground(&mut npz)?,
+            patches: read_patches(&mut npz, e)?,
             map: if npz.has("map_control_points") { Some(read_map(&mut npz)?) } else { None },
             history_objective,
             history_constraint_violation: npz.f64("history_constraint_violation", &[iterations])?,
@@ -120,6 +121,36 @@ fn read_phases(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<f64>>> {
         phases.push(row[..used].to_vec());
     }
     Ok(phases)
+}
+
+/// (E, S, 4, 3), padded with NaN at the end of each foot's stances.
+fn read_patches(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<[[f64; 3]; 4]>>> {
+    let name = "patch_corners";
+    if !npz.has(name) {
+        return Ok(Vec::new());
+    }
+    let (shape, values) = npz.any_f64(name)?;
+    let &[rows, stances, 4, 3] = &shape[..] else {
+        return Err(npz.error(name, format!("shape {shape:?}, expected ({feet}, S, 4, 3)")));
+    };
+    if rows != feet {
+        return Err(npz.error(name, format!("shape {shape:?}, expected ({feet}, S, 4, 3)")));
+    }
+    let corners = values.as_chunks::<3>().0.as_chunks::<4>().0;
+    let mut patches = Vec::with_capacity(feet);
+    for foot in 0..feet {
+        let row = &corners[foot * stances..(foot + 1) * stances];
+        let used = row.iter().position(|p| p.iter().flatten().all(|v| v.is_nan())).unwrap_or(stances);
+        let bad = |at: usize, expected: fn(&f64) -> bool| !row[at].iter().flatten().all(expected);
+        if let Some(at) = (0..used).find(|&at| bad(at, |v| v.is_finite())) {
+            return Err(npz.error(name, format!("[{foot}, {at}] has a value that is not finite")));
+        }
+        if let Some(at) = (used..stances).find(|&at| bad(at, |v| v.is_nan())) {
+            return Err(npz.error(name, format!("[{foot}, {at}] follows a stance without a patch")));
+        }
+        patches.push(row[..used].to_vec());
+    }
+    Ok(patches)
 }
 
 fn read_splines(npz: &mut NpzReader) -> Result<Vec<NamedArray>> {

@@ -12,9 +12,9 @@ use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
 use crate::scenario::{LoadedScenario, Scenario};
-use crate::terrain::Ground;
+use crate::terrain::{Ground, Patch};
 use crate::trajectory::Layout;
-use crate::trajectory::sampling;
+use crate::trajectory::sampling::{self, FootMotion};
 use crate::trajectory::variables::FootVariables;
 use crate::warp::WarpMap;
 
@@ -63,7 +63,7 @@ impl Plan {
                 plan.foot_acceleration.push(foot.acceleration.into());
                 plan.foot_force.push((foot.force * unit).into());
                 plan.foot_contact.push(foot.contact);
-                plan.foot_normal.push(model.ground.normal(foot.position.x, foot.position.y));
+                plan.foot_normal.push(normal(model, i, k, &foot));
                 feet_in_f.foot_position.push(foot.warped_position.into());
                 feet_in_f.foot_force.push((foot.warped_force * unit).into());
             }
@@ -97,6 +97,7 @@ impl Plan {
             phase_durations: phase_durations(&model.layout),
             splines: splines(motion),
             ground: ground_grid(provenance.ground),
+            patches: patches(model),
             map: model.spaces.map().map(WarpMap::to_grid),
             history_objective: history(|r| r.objective),
             history_constraint_violation: history(|r| r.violation),
@@ -104,6 +105,21 @@ impl Plan {
             meta: meta(motion, provenance),
         }
     }
+}
+
+/// The upward unit normal of the ground under a foot at time k, in samples: that of its patch in stance, that of the surface
+/// which it clears in swing. Without patches there is only one surface.
+fn normal(model: &Model, foot: usize, k: f64, motion: &FootMotion) -> [f64; 3] {
+    let stance = model.layout.feet[foot].swings.iter().filter(|s| s.swing.end <= k).count();
+    match model.patch(foot, stance).filter(|_| motion.contact) {
+        Some(patch) => patch.normal(),
+        None => model.surfaces.feet.normal(motion.position.x, motion.position.y),
+    }
+}
+
+/// The corners of each stance's patch.
+fn patches(model: &Model) -> Vec<Vec<[[f64; 3]; 4]>> {
+    model.patches.iter().map(|stances| stances.iter().map(Patch::corners).collect()).collect()
 }
 
 /// Stance and swing durations by foot, s.
@@ -168,6 +184,7 @@ fn meta_robot(model: &Model, loaded: &LoadedScenario) -> MetaRobot {
         gravity: [0.0, 0.0, -GRAVITY],
         reach: model.reach.clone(),
         torso: robot.torso,
+        foot_radius: robot.foot_radius(),
     }
 }
 

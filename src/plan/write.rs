@@ -55,6 +55,14 @@ impl Plan {
         if let Some(raw) = &ground.raw {
             npz.add_f64("heightfield_raw", &shape, raw.iter().copied())?;
         }
+        if !self.patches.is_empty() {
+            let stances = self.patches.iter().map(Vec::len).max().unwrap_or(0);
+            let padded = self.patches.iter().flat_map(|patches| {
+                let rest = std::iter::repeat_n(&[[f64::NAN; 3]; 4], stances - patches.len());
+                patches.iter().chain(rest).flatten().flatten().copied()
+            });
+            npz.add_f64("patch_corners", &[e, stances, 4, 3], padded)?;
+        }
         if let Some(map) = &self.map {
             npz.add_map(map)?;
         }
@@ -145,6 +153,8 @@ impl Plan {
         if let Some(raw) = &ground.raw {
             ensure("heightfield_raw", raw.len() == cells, raw)?;
         }
+        let feet = self.patches.len();
+        ensure("patch_corners", feet == 0 || feet == e, self.patches.iter().flatten().flatten().flatten())?;
         if let Some(map) = &self.map {
             let points = &map.control_points;
             ensure(

@@ -3,6 +3,9 @@
 //! | file | holds |
 //! | --- | --- |
 //! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
+//! | `base_path` | where the base is guessed to be at each time |
+//! | `footholds` | which patch each stance gets, where feet may stand on patches only |
+//! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | [`stage`] | which stages there are |
@@ -13,11 +16,14 @@
 //! | [`derivatives`] | analytic derivatives against differences |
 //! | `threads` | the evaluation, split between two threads |
 
+mod base_path;
 pub mod derivatives;
+mod footholds;
 pub mod guess;
 pub mod motion;
 mod options;
 pub mod problem;
+mod retiming;
 pub mod solve;
 pub mod stage;
 mod standing;
@@ -25,6 +31,7 @@ mod stopping;
 mod threads;
 pub mod violation;
 
+pub use footholds::choose_gait;
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
 pub use solve::{Host, Progress, Task, solve};

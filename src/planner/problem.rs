@@ -3,6 +3,7 @@
 use crate::constraints::base_clearance::BaseClearance;
 use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
+use crate::constraints::foothold_patch::FootholdPatch;
 use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
 use crate::constraints::friction_conformal::FrictionConformal;
@@ -33,6 +34,8 @@ use crate::nlp::{Constraint, Cost, Model, State};
 const COST_SCALE: f64 = 1e3;
 /// Weight of the swings' acceleration, relative to that of the base's.
 const SWING_WEIGHT: f64 = 1e-3;
+/// The same over ground with edges, where swings are higher and longer: joints and controller must follow them.
+const SWING_WEIGHT_OVER_EDGES: f64 = 1e-2;
 /// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
 const POSTURE_WEIGHT: f64 = 100.0;
 
@@ -88,7 +91,9 @@ impl GaitProblem {
             Box::new(BaseClearance::new(&model, motion.base_clearance)),
             Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
         ];
-        if let Some(max_slope) = contact.max_slope {
+        if model.surfaces.have_edges() {
+            blocks.push(Box::new(FootholdPatch::new(&model)));
+        } else if let Some(max_slope) = contact.max_slope {
             blocks.push(Box::new(FootholdSlope::new(&model, max_slope, contact.edge_margin)));
         }
         if model.legs.iter().any(Option::is_some) {
@@ -103,7 +108,8 @@ impl GaitProblem {
         let mut costs: Vec<Box<dyn Cost>> = Vec::new();
         if choice.with_costs && base > 0.0 {
             costs.push(Box::new(BaseAcceleration::new(&model, base)));
-            costs.push(Box::new(SwingAcceleration::new(&model, SWING_WEIGHT * base)));
+            let swing = if model.surfaces.have_edges() { SWING_WEIGHT_OVER_EDGES } else { SWING_WEIGHT };
+            costs.push(Box::new(SwingAcceleration::new(&model, swing * base)));
             costs.push(Box::new(Posture::new(&model, POSTURE_WEIGHT * base)));
         }
         if choice.with_costs && force > 0.0 {
@@ -226,14 +232,15 @@ impl GaitProblem {
 }
 
 /// The base's first control points are pinned. Switches stay within their rooms. In F, the free control points of a swing stay
-/// above the ground: a spline obeys z̄ ≥ 0 at every instant if its control points do (Eq. 8, second line).
+/// above the ground: a spline obeys z̄ ≥ 0 at every instant if its control points do (Eq. 8, second line). With edges, z̄ = 0
+/// is the posture surface, which is not the ground.
 fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
     let mut upper = vec![f64::INFINITY; model.layout.variables];
     lower[..6].copy_from_slice(&initial[..6]);
     upper[..6].copy_from_slice(&initial[..6]);
     for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
-        if model.spaces.feet.is_warped() {
+        if model.spaces.feet.is_warped() && !model.surfaces.have_edges() {
             for c in 0..SWING_CONTROL_POINTS {
                 lower[swing.control_points + 3 * c + 2] = 0.0;
             }

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::footholds;
 use super::guess;
 use super::motion::{Motion, Seconds};
 use super::options;
@@ -16,6 +17,7 @@ use crate::ipopt::{self, IterationRecord, LinearSolver, Status};
 use crate::nlp::Model;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
+use crate::terrain::Surfaces;
 use crate::trajectory::{Gait, Spaces};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
@@ -35,8 +37,8 @@ pub struct Task<'a> {
     /// Its gait.
     pub gait: &'a Gait,
     /// Its ground.
-    pub ground: &'a Arc<Heightfield>,
-    /// The map over that ground, for all formulations but the direct one.
+    pub surfaces: &'a Surfaces,
+    /// The map over the posture surface, for all formulations but the direct one.
     pub map: Option<&'a WarpMap>,
 }
 
@@ -45,7 +47,13 @@ impl Task<'_> {
     fn model(&self) -> Result<Model> {
         let map = self.map.map(|map| Arc::new(map.clone()));
         let spaces = Spaces::of(self.scenario.formulation, map)?;
-        Ok(Model::new(self.scenario, self.robot, self.gait, self.ground.clone(), spaces))
+        let mut model = Model::new(self.scenario, self.robot, self.gait, self.surfaces.clone(), spaces);
+        if let Some(contact) = &self.surfaces.contact {
+            let found = footholds::assign(self.scenario, &model, contact)?;
+            found.walkable?;
+            model.patches = found.patches;
+        }
+        Ok(model)
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -90,6 +98,8 @@ pub trait Host {
 pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
     let steps = match solver.continuation {
+        // Patches of a lower ground are not those of the whole one.
+        _ if task.surfaces.have_edges() => 0,
         Continuation::Mode(ContinuationMode::Off) => 0,
         Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
         Continuation::Steps(n) => n,
@@ -211,8 +221,8 @@ impl<'a> Solve<'a> {
         if stage.is_whole() {
             return self.task.model().map(Some);
         }
-        let Task { scenario, robot, gait, ground, .. } = *self.task;
-        let ground = Arc::new(scaled(ground, stage.height_fraction())?);
+        let Task { scenario, robot, gait, surfaces, .. } = *self.task;
+        let ground = Arc::new(scaled(&surfaces.posture, stage.height_fraction())?);
         let map = match scenario.formulation {
             Formulation::Direct => None,
             Formulation::Warped | Formulation::Hybrid => match self.host.build_map(&ground)? {
@@ -221,7 +231,7 @@ impl<'a> Solve<'a> {
             },
         };
         let spaces = Spaces::of(scenario.formulation, map)?;
-        Ok(Some(Model::new(scenario, robot, gait, ground, spaces)))
+        Ok(Some(Model::new(scenario, robot, gait, Surfaces::one(ground), spaces)))
     }
 
     /// Solves from x with at most `budget` iterations.

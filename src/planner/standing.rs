@@ -79,7 +79,7 @@ pub fn ensure_reach(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
                 let mut z = reach.center[2];
                 for _ in 0..20 {
                     let q = pose.position + pose.rotation * Vector3::new(at(0, a), at(1, b), z);
-                    z -= (q.z - model.ground.height(q.x, q.y)) * pose.rotation[(2, 2)];
+                    z -= (q.z - model.surfaces.posture.height(q.x, q.y)) * pose.rotation[(2, 2)];
                 }
                 nearest = nearest.min(((z - reach.center[2]).abs() - reach.half_size[2]).max(0.0));
             }

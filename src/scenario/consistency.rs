@@ -62,11 +62,11 @@ fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
         return Err(document.error("terrain.extent", what));
     }
     if let TerrainSpec::Heightmap(spec) = &scenario.terrain
-        && spec.smoothing() > spec.smoothing_limit()
+        && spec.smoothing(scenario.footholds()) > spec.smoothing_limit()
     {
         let what = format!(
             "given {}, allowed: at most {} m, {} times terrain.spacing",
-            spec.smoothing(),
+            spec.smoothing(scenario.footholds()),
             spec.smoothing_limit(),
             HeightmapSpec::SMOOTHING_LIMIT
         );

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::gait::GaitSpec;
 use super::map::MapSpec;
-use super::motion::{ContactSpec, DiscretizationSpec, GoalSpec, MotionSpec, PhysicsSpec, StartSpec};
+use super::motion::{ContactSpec, DiscretizationSpec, Footholds, GoalSpec, MotionSpec, PhysicsSpec, StartSpec};
 use super::solver::SolverSpec;
 use super::terrain::TerrainSpec;
 use crate::input;
@@ -62,6 +62,16 @@ pub struct Scenario {
     /// How the NLP is solved.
     #[serde(default)]
     pub solver: SolverSpec,
+}
+
+impl Scenario {
+    /// Where feet may stand.
+    pub fn footholds(&self) -> Footholds {
+        self.contact.footholds.unwrap_or(match self.terrain {
+            TerrainSpec::Heightmap(_) => Footholds::Patches,
+            _ => Footholds::Anywhere,
+        })
+    }
 }
 
 fn default_schema() -> u32 {

@@ -68,6 +68,16 @@ pub enum Cone {
     Conformal,
 }
 
+/// Where feet may stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Footholds {
+    /// Each stance within a patch of even ground, chosen before the motion is optimized; the ground may have edges.
+    Patches,
+    /// Anywhere on the ground, which must be smooth.
+    Anywhere,
+}
+
 /// `[contact]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -80,6 +90,8 @@ pub struct ContactSpec {
     pub friction_margin: f64,
     /// The form of the friction cone.
     pub cone: Cone,
+    /// Where feet may stand; default: patches on a heightmap, anywhere on a terrain that is a function.
+    pub footholds: Option<Footholds>,
     /// Largest slope |∇h| at a foothold; default: no limit.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
@@ -90,7 +102,14 @@ pub struct ContactSpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { friction: 0.75, friction_margin: 0.0, cone: Cone::Exact, max_slope: None, edge_margin: 0.03 }
+        Self {
+            friction: 0.75,
+            friction_margin: 0.0,
+            cone: Cone::Exact,
+            footholds: None,
+            max_slope: None,
+            edge_margin: 0.03,
+        }
     }
 }
 

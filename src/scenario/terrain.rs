@@ -6,6 +6,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::motion::Footholds;
+
 /// `[terrain]`: the ground, by `kind`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
@@ -275,7 +277,8 @@ pub struct HeightmapSpec {
     /// Image: height from black to white, m; required. Array: factor that converts to m; default 1.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub height_scale: Option<f64>,
-    /// Standard deviation of the smoothing, m; default: 1.5 cells or 0.03 m, whichever is larger; at most 50 cells.
+    /// Standard deviation of the smoothing, m; at most 50 cells. Default with `contact.footholds = "patches"`: 0; else 1.5 cells or
+    /// 0.03 m, whichever is larger.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub smoothing: Option<f64>,
     /// x, y of the center of the file, m.
@@ -301,8 +304,11 @@ impl HeightmapSpec {
     }
 
     /// Standard deviation of the smoothing, m.
-    pub fn smoothing(&self) -> f64 {
-        let default = (Self::SMOOTHING_CELLS * self.spacing).max(Self::SMOOTHING_LENGTH);
+    pub fn smoothing(&self, footholds: Footholds) -> f64 {
+        let default = match footholds {
+            Footholds::Patches => 0.0,
+            Footholds::Anywhere => (Self::SMOOTHING_CELLS * self.spacing).max(Self::SMOOTHING_LENGTH),
+        };
         self.smoothing.unwrap_or(default.min(self.smoothing_limit()))
     }
 }

@@ -10,6 +10,7 @@ use super::{image, npy};
 use crate::digest::sha256_hex;
 use crate::error::{Error, Result};
 use crate::heightfield::Grid;
+use crate::scenario::Footholds;
 use crate::scenario::terrain::HeightmapSpec;
 
 /// Larger files are refused unread, bytes.
@@ -37,7 +38,12 @@ const FORMATS: [Format; 2] = [
 ///
 /// # Errors
 /// [`Error::Key`] for files that cannot be read, decoded, or turned into a heightfield.
-pub fn ground(kind: &'static str, spec: &HeightmapSpec, base_dir: &Path) -> Result<Ground> {
+pub fn ground(
+    kind: &'static str,
+    spec: &HeightmapSpec,
+    footholds: Footholds,
+    base_dir: &Path,
+) -> Result<Ground> {
     let name = &spec.file;
     let refuse = |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{name:?}: {what}"));
     let bytes = read(&base_dir.join(name)).map_err(|what| refuse(&what))?;
@@ -60,7 +66,7 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, base_dir: &Path) -> Resu
     };
     // Flipped: the first row of the file has the largest y.
     let heights: Vec<f64> = values.chunks_exact(columns).rev().flatten().map(|v| v * scale).collect();
-    let mut ground = scan::ground(kind, spec, Scan { grid, heights })?;
+    let mut ground = scan::ground(kind, spec, footholds, Scan { grid, heights })?;
     ground.inputs.push((name.clone(), sha256_hex(&bytes)));
     Ok(ground)
 }

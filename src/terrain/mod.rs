@@ -5,23 +5,30 @@
 //! and a line to `FORMATS` in `heightmap.rs`.
 
 mod analytic;
+mod contact;
 mod fill;
 mod formula;
 mod function;
 mod ground;
 mod heightmap;
 mod image;
+mod morphology;
 mod npy;
+mod patch;
 mod raster;
 mod scan;
 mod smooth;
+mod surfaces;
 
 use std::path::Path;
 
 use crate::error::Result;
-use crate::scenario::TerrainSpec;
+use crate::scenario::{Scenario, TerrainSpec};
 use formula::Formula;
+pub use contact::{ContactGround, FootNeeds};
 pub use ground::{Ground, GroundReport};
+pub use patch::Patch;
+pub use surfaces::Surfaces;
 
 /// Builds the ground that a scenario specifies; its relative paths start at `base_dir`. Assumes that the ranges of
 /// [`TerrainSpec`] hold, as loading a scenario ensures.
@@ -29,9 +36,9 @@ pub use ground::{Ground, GroundReport};
 /// # Errors
 /// [`Error::Key`](crate::Error::Key) for files that cannot be read or decoded, expressions that fail, and heights that are not
 /// finite. Says what, where, and what is allowed.
-pub fn build(spec: &TerrainSpec, base_dir: &Path) -> Result<Ground> {
-    let kind = spec.kind();
-    match spec {
+pub fn build(scenario: &Scenario, base_dir: &Path) -> Result<Ground> {
+    let kind = scenario.terrain.kind();
+    match &scenario.terrain {
         TerrainSpec::Flat(flat) => function::ground(kind, &flat.domain, |_, _| Ok(0.0)),
         TerrainSpec::Rippled(rippled) => {
             function::ground(kind, &rippled.domain, total(analytic::rippled(rippled)))
@@ -43,7 +50,7 @@ pub fn build(spec: &TerrainSpec, base_dir: &Path) -> Result<Ground> {
             let formula = Formula::parse(&spec.expression)?;
             function::ground(kind, &spec.domain, |x, y| formula.height(x, y))
         }
-        TerrainSpec::Heightmap(heightmap) => heightmap::ground(kind, heightmap, base_dir),
+        TerrainSpec::Heightmap(heightmap) => heightmap::ground(kind, heightmap, scenario.footholds(), base_dir),
     }
 }
 

@@ -6,6 +6,7 @@ use super::raster::{bilinear, range};
 use super::smooth::smooth;
 use crate::error::{Error, Result};
 use crate::heightfield::{Grid, Heightfield, MAX_SAMPLES};
+use crate::scenario::Footholds;
 use crate::scenario::terrain::HeightmapSpec;
 
 /// Coarser scans are refined to about this spacing, m, so that users of the raster get a fine one.
@@ -27,13 +28,18 @@ pub struct Scan {
 ///
 /// # Errors
 /// [`Error::Key`] if nothing was measured, the heights differ too much or are too large, or the extent exceeds the scan.
-pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Ground> {
+pub fn ground(
+    kind: &'static str,
+    spec: &HeightmapSpec,
+    footholds: Footholds,
+    scan: Scan,
+) -> Result<Ground> {
     let refuse =
         |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{:?}: {what}", spec.file));
     let Scan { grid, heights: measured } = scan;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
-    let smoothing = spec.smoothing();
+    let smoothing = spec.smoothing(footholds);
 
     let mut filled = measured.clone();
     fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;
@@ -49,18 +55,23 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Gr
     let whole = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &smoothed)
         .map_err(|e| refuse(&e))?;
 
+    let flat_between = |heights: &[f64], x: f64, y: f64| {
+        bilinear(grid.columns, heights, (x - grid.origin[0]) / spacing, (y - grid.origin[1]) / spacing)
+    };
     let fine = refined_spacing(extent, spacing);
     let field = if extent == grid.extent() && fine == spacing {
         whole
     } else {
-        Heightfield::from_function(extent, fine, |x, y| Ok(whole.height(x, y)))
-            .map_err(|e| Error::key("terrain.extent", e))?
+        Heightfield::from_function(extent, fine, |x, y| {
+            Ok(match footholds {
+                // A spline would ring at edges.
+                Footholds::Patches => flat_between(&smoothed, x, y),
+                Footholds::Anywhere => whole.height(x, y),
+            })
+        })
+        .map_err(|e| Error::key("terrain.extent", e))?
     };
-    let place = |x: f64, y: f64| ((x - grid.origin[0]) / spacing, (y - grid.origin[1]) / spacing);
-    let raw = field.grid().sample(|x, y| {
-        let (column, row) = place(x, y);
-        Ok(bilinear(grid.columns, &filled, column, row))
-    })?;
+    let raw = field.grid().sample(|x, y| Ok(flat_between(&filled, x, y)))?;
 
     let mut error = FitError::default();
     let (mut cells, mut holes_filled) = (0, 0);
@@ -77,14 +88,20 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, scan: Scan) -> Result<Gr
     let mut report = GroundReport::of(kind, &field, &error);
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
-    report.notes = notes(spec, &grid, cells, &report);
+    report.notes = notes(spec, footholds, &grid, cells, &report);
     Ok(Ground { field, raw: Some(raw), report, inputs: Vec::new() })
 }
 
 /// What a user should know about a scan, of whose grid `cells` lie within the extent.
-fn notes(spec: &HeightmapSpec, grid: &Grid, cells: usize, report: &GroundReport) -> Vec<String> {
+fn notes(
+    spec: &HeightmapSpec,
+    footholds: Footholds,
+    grid: &Grid,
+    cells: usize,
+    report: &GroundReport,
+) -> Vec<String> {
     let mut notes = Vec::new();
-    if spec.smoothing.is_none() {
+    if spec.smoothing.is_none() && footholds == Footholds::Anywhere {
         notes.push(format!(
             "smoothed over {:.3} m by default (the larger of {} cells and {} m; terrain.smoothing sets it); \
              heights moved by {:.4} m rms, {:.4} m at most",

@@ -33,6 +33,20 @@ impl Gait {
         Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
     }
 
+    /// The same with shorter cycles: more steps, with swings that last as long. None if the gait has no cycle, or the scenario gives
+    /// its length or the duty factor.
+    pub fn with_more_steps(scenario: &Scenario, robot: &Robot, factor: f64) -> Option<Result<Self>> {
+        let gait = &scenario.gait;
+        let cyclic = !matches!(gait.kind, GaitKind::Stand | GaitKind::Custom);
+        if !cyclic || gait.cycle.is_some() || gait.duty.is_some() {
+            return None;
+        }
+        let mut quicker = scenario.clone();
+        quicker.gait.cycle = Some(factor * robot.gait_cycle.unwrap_or(CYCLE));
+        quicker.gait.duty = Some(1.0 - (1.0 - default_duty(gait.kind)) / factor);
+        Some(Self::of(&quicker, robot))
+    }
+
     /// The gait of a scenario for feet named LF, RF, LH, RH (the built-in patterns) or in the robot's order (custom); `cycle` is the
     /// length of a cycle, s, where the scenario names none.
     ///
@@ -75,12 +89,12 @@ impl Gait {
 
 /// The lift-off of each foot, as a fraction of the cycle, and the default duty factor.
 fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
-    let (table, duty): ([f64; 4], f64) = match kind {
+    let table: [f64; 4] = match kind {
         // One foot at a time: LH, LF, RH, RF.
-        GaitKind::Walk => ([0.25, 0.75, 0.0, 0.5], 0.75),
-        GaitKind::Trot => ([0.0, 0.5, 0.5, 0.0], 0.6),
-        GaitKind::Pace => ([0.0, 0.5, 0.0, 0.5], 0.6),
-        GaitKind::Bound => ([0.0, 0.0, 0.5, 0.5], 0.6),
+        GaitKind::Walk => [0.25, 0.75, 0.0, 0.5],
+        GaitKind::Trot => [0.0, 0.5, 0.5, 0.0],
+        GaitKind::Pace => [0.0, 0.5, 0.0, 0.5],
+        GaitKind::Bound => [0.0, 0.0, 0.5, 0.5],
         GaitKind::Stand | GaitKind::Custom => unreachable!("handled by the caller"),
     };
     let order = ["LF", "RF", "LH", "RH"];
@@ -95,7 +109,12 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
             })
         })
         .collect::<Result<_>>()?;
-    Ok((offsets, duty))
+    Ok((offsets, default_duty(kind)))
+}
+
+/// The fraction of a cycle that a foot stands.
+fn default_duty(kind: GaitKind) -> f64 {
+    if kind == GaitKind::Walk { 0.75 } else { 0.6 }
 }
 
 /// As many whole cycles as fit into the horizon with standing at both ends. The remaining time is divided between the ends.

@@ -302,6 +302,13 @@ impl Layout {
         })
     }
 
+    /// Longest time from one lift-off of a foot to the next, s; the whole motion if it lifts off at most once.
+    pub fn longest_cycle(&self, foot: usize) -> f64 {
+        let swings = &self.feet[foot].swings;
+        let cycles = swings.windows(2).map(|pair| pair[1].swing.start - pair[0].swing.start);
+        cycles.reduce(f64::max).unwrap_or(self.intervals as f64) * self.time_step
+    }
+
     /// A foot at an instant, as a function of its switches if these are variables.
     pub fn timed_foot(&self, foot: usize, instant: Instant) -> TimedNode {
         if let Phase::Swing(j) = self.phase_at(foot, instant)

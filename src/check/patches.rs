@@ -1,0 +1,139 @@
+//! Ground with edges: feet stand on the plane of their patch, the patch is on the raw ground, and swinging feet, as balls, keep
+//! above the raw ground.
+
+use super::laws;
+use super::subject::{Finding, Subject, Worst};
+use super::vector::{add, cross, dot, norm, scale, sub};
+
+/// Distance between the points at which the raw ground under a foot is looked at, as a fraction of the foot's radius.
+const RESOLUTION: f64 = 0.2;
+
+/// A patch as the file has it: four corners around a rectangle.
+pub(super) struct PlanPatch<'a>(pub &'a [[f64; 3]; 4]);
+
+impl PlanPatch<'_> {
+    /// The upward unit normal.
+    pub fn normal(&self) -> [f64; 3] {
+        let c = self.0;
+        let n = cross(sub(c[1], c[0]), sub(c[3], c[0]));
+        scale(if n[2] < 0.0 { -1.0 } else { 1.0 } / norm(n), n)
+    }
+
+    /// Height of the plane, m.
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        let (n, c) = (self.normal(), self.0[0]);
+        c[2] - (n[0] * (x - c[0]) + n[1] * (y - c[1])) / n[2]
+    }
+
+    /// Horizontal distance beyond the sides, m.
+    fn beyond(&self, x: f64, y: f64) -> f64 {
+        let along = |from: [f64; 3], to: [f64; 3]| {
+            let d = [to[0] - from[0], to[1] - from[1]];
+            let length = d[0].hypot(d[1]);
+            let at = (d[0] * (x - from[0]) + d[1] * (y - from[1])) / length;
+            (-at).max(at - length).max(0.0)
+        };
+        let c = self.0;
+        along(c[0], c[1]).hypot(along(c[0], c[3]))
+    }
+}
+
+/// The patch on which a foot stands at a sample, if it stands and has one.
+pub(super) fn patch_at<'a>(s: &Subject<'a>, stances: &[usize], n: usize, e: usize) -> Option<PlanPatch<'a>> {
+    let standing = s.in_contact(n, e);
+    s.plan.patches.get(e)?.get(stances[n]).filter(|_| standing).map(PlanPatch)
+}
+
+/// For each sample, how many stances of a foot are over.
+pub(super) fn stance_numbers(s: &Subject, e: usize) -> Vec<usize> {
+    let mut over = 0;
+    (0..s.samples)
+        .map(|n| {
+            over += usize::from(n > 0 && s.in_contact(n - 1, e) && !s.in_contact(n, e));
+            over
+        })
+        .collect()
+}
+
+pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
+    if !s.has_edges() {
+        return;
+    }
+    let [mut outside, mut raw, mut missing, mut cut] = [Worst::default(); 4];
+    for e in 0..s.feet {
+        let stances = stance_numbers(s, e);
+        let needed = stances[s.samples - 1] + usize::from(s.in_contact(s.samples - 1, e));
+        missing.meet(needed.abs_diff(s.plan.patches[e].len()) as f64, 0, Some(e));
+        let directions = center_directions(s, e);
+        let mut before = None;
+        for n in 0..s.samples {
+            let [x, y, _] = s.foot_position(n, e);
+            if let Some(patch) = patch_at(s, &stances, n, e) {
+                outside.meet(1e3 * patch.beyond(x, y), n, Some(e));
+                // A standing foot does not move: once for each stance is enough.
+                if before != Some(stances[n]) {
+                    raw.meet(1e3 * roughness(s, &patch, [x, y]), n, Some(e));
+                    before = Some(stances[n]);
+                }
+            } else if !s.in_contact(n, e) {
+                cut.meet(1e3 * depth(s, s.foot_position(n, e), directions[n]), n, Some(e));
+            }
+        }
+    }
+    findings.push((laws::PATCH_COUNT, missing));
+    findings.push((laws::PATCH, outside));
+    findings.push((laws::PATCH_ROUGHNESS, raw));
+    findings.push((laws::SWING_EDGE, cut));
+}
+
+/// Offsets within a foot's radius of its axis.
+fn under_foot(radius: f64) -> impl Iterator<Item = [f64; 2]> {
+    let steps = (1.0 / RESOLUTION) as i32;
+    let at = move |k: i32| radius * f64::from(k) / f64::from(steps);
+    (-steps..=steps)
+        .flat_map(move |i| (-steps..=steps).map(move |j| [at(i), at(j)]))
+        .filter(move |d| d[0].hypot(d[1]) <= radius)
+}
+
+/// Largest difference of the raw ground under a foot from the plane of its patch, m.
+fn roughness(s: &Subject, patch: &PlanPatch, [x, y]: [f64; 2]) -> f64 {
+    under_foot(s.plan.meta.robot.foot_radius)
+        .map(|[u, v]| (s.ground.height(x + u, y + v) - patch.height(x + u, y + v)).abs())
+        .fold(0.0, f64::max)
+}
+
+/// How deep a foot, as a ball that touches its contact point, is in the raw ground, m.
+fn depth(s: &Subject, contact: [f64; 3], direction: [f64; 3]) -> f64 {
+    let radius = s.plan.meta.robot.foot_radius;
+    let [x, y, z] = add(contact, scale(radius, direction));
+    under_foot(radius)
+        .map(|[u, v]| {
+            let below = (radius * radius - u * u - v * v).max(0.0).sqrt();
+            s.ground.height(x + u, y + v) + below - z
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Unit vectors from the contact point to the center of a foot, (N,): the normal in stance, turning evenly from one to the next in
+/// swing.
+fn center_directions(s: &Subject, e: usize) -> Vec<[f64; 3]> {
+    let normal = |n: usize| s.plan.foot_normal[n * s.feet + e];
+    let mut directions: Vec<[f64; 3]> = (0..s.samples).map(normal).collect();
+    let mut n = 0;
+    while n < s.samples {
+        let first = n;
+        while n < s.samples && !s.in_contact(n, e) {
+            n += 1;
+        }
+        if first > 0 && n > first && n < s.samples {
+            let (from, to) = (normal(first - 1), normal(n));
+            for (k, direction) in directions.iter_mut().enumerate().take(n).skip(first) {
+                let u = (k + 1 - first) as f64 / (n + 1 - first) as f64;
+                let turned = add(scale(1.0 - u, from), scale(u, to));
+                *direction = scale(1.0 / dot(turned, turned).sqrt(), turned);
+            }
+        }
+        n += 1;
+    }
+    directions
+}

@@ -1,0 +1,300 @@
+//! Where on a raster a foot can stand.
+//!
+//! A cell is steppable if a plane fits the ground under the foot, if that plane is not too steep, and if nothing beside the
+//! foot rises so far above it that the foot would touch it on its way down.
+
+use super::morphology::{Offset, closed, disc, for_each_neighborhood};
+use super::patch::Patch;
+use crate::heightfield::Grid;
+
+/// Headings that are tried for the rectangle of a patch, over a quarter turn.
+const HEADINGS: usize = 6;
+/// What may rise beside a foot, as a multiple of the roughness allowed under it.
+const RISE_BESIDE: f64 = 2.0;
+/// A patch reaches beyond its outermost cells by this fraction of a cell, so that one of a single cell has an inside.
+const CELL_FRACTION: f64 = 0.1;
+
+/// A place this close to a line of cells, in cells, is on it.
+const ON_LINE: f64 = 1e-6;
+
+/// What a foot needs in order to stand, lengths in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FootNeeds {
+    /// The ground must be even within this distance of the contact point …
+    pub even: f64,
+    /// … up to this difference from a plane.
+    pub roughness: f64,
+    /// Nothing may rise beside the foot within this distance.
+    pub beside: f64,
+    /// The ground is not lower than around it by more than this …
+    pub depth: f64,
+    /// … where what is lower is narrower than this: the trunk stays above such a gap, and the foot does not reach down.
+    pub gap: f64,
+    /// The plane's largest slope.
+    pub slope: f64,
+    /// A patch extends from its center by at most this much along each side.
+    pub patch: f64,
+}
+
+/// Heights, the plane at each cell, and the cells on which a foot can stand.
+#[derive(Clone, Debug)]
+pub struct ContactGround {
+    grid: Grid,
+    needs: FootNeeds,
+    heights: Vec<f64>,
+    /// Height, and slope along x and y, of the plane that fits best around each cell.
+    planes: Vec<[f64; 3]>,
+    steppable: Vec<bool>,
+}
+
+impl ContactGround {
+    /// Fits a plane around each cell and judges it.
+    pub fn new(grid: &Grid, heights: &[f64], needs: FootNeeds) -> Self {
+        let planes = planes(grid, heights, needs.even);
+        let mut steppable: Vec<bool> = planes.iter().map(|p| p[1].hypot(p[2]) <= needs.slope).collect();
+        let mut rule_out = |around: &[Offset], fits: &dyn Fn(f64) -> bool| {
+            for_each_neighborhood(grid, around, |cell, mut neighbors| {
+                let [h, x, y] = planes[cell];
+                steppable[cell] = steppable[cell]
+                    && neighbors.all(|(n, i)| {
+                        let (u, v, _) = around[n];
+                        let plane = h + x * u as f64 * grid.spacing[0] + y * v as f64 * grid.spacing[1];
+                        fits(heights[i] - plane)
+                    });
+            });
+        };
+        rule_out(&under_foot(grid, needs.even), &|above| above.abs() <= needs.roughness);
+        rule_out(&disc(grid, needs.beside), &|above| above <= RISE_BESIDE * needs.roughness);
+        for ((steppable, height), filled) in steppable.iter_mut().zip(heights).zip(closed(grid, heights, needs.gap)) {
+            *steppable &= filled - height <= needs.depth;
+        }
+        // What lies beyond the border is not known.
+        let border = grid.spacing.map(|s| (needs.beside / s).ceil() as usize);
+        for (cell, steppable) in steppable.iter_mut().enumerate() {
+            let (column, row) = (cell % grid.columns, cell / grid.columns);
+            let inside = |at: usize, count: usize, border: usize| at >= border && at + border < count;
+            *steppable &= inside(column, grid.columns, border[0]) && inside(row, grid.rows, border[1]);
+        }
+        Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable }
+    }
+
+    /// The raster.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// By cell, (rows, columns).
+    pub fn steppable(&self) -> &[bool] {
+        &self.steppable
+    }
+
+    /// Height of the plane at a cell, and its slope along x and y.
+    pub fn plane(&self, cell: usize) -> [f64; 3] {
+        self.planes[cell]
+    }
+
+    /// x, y of a cell, and the height of its plane there, m.
+    pub fn point(&self, cell: usize) -> [f64; 3] {
+        let (column, row) = (cell % self.grid.columns, cell / self.grid.columns);
+        [self.grid.x(column), self.grid.y(row), self.planes[cell][0]]
+    }
+
+    /// The cell nearest to a place, if a foot can stand there.
+    pub fn steppable_cell(&self, place: [f64; 2]) -> Option<usize> {
+        self.cell_at(place).filter(|&cell| self.steppable[cell])
+    }
+
+    /// Whether a foot can stand at the cell nearest to a place.
+    pub fn is_steppable(&self, place: [f64; 2]) -> bool {
+        self.steppable_cell(place).is_some()
+    }
+
+    /// In how many of four directions the ground next to a foot on this cell cannot be stood on.
+    pub fn closed_directions(&self, cell: usize) -> u8 {
+        let [x, y, _] = self.point(cell);
+        let away = self.needs.even;
+        let around = [[away, 0.0], [-away, 0.0], [0.0, away], [0.0, -away]];
+        around.iter().map(|[u, v]| u8::from(!self.is_steppable([x + u, y + v]))).sum()
+    }
+
+    /// Whether there is a cell within a distance, m, on which no foot can stand.
+    pub fn has_edge_within(&self, place: [f64; 2], distance: f64) -> bool {
+        let around = disc(&self.grid, distance);
+        around.iter().any(|&(u, v, _)| {
+            let offset = [u as f64 * self.grid.spacing[0], v as f64 * self.grid.spacing[1]];
+            !self.is_steppable([place[0] + offset[0], place[1] + offset[1]])
+        })
+    }
+
+    /// The up to four cells of which a place is in the middle; fewer where it is on one of their lines.
+    fn cells_around(&self, place: [f64; 2]) -> Option<impl Iterator<Item = usize>> {
+        let range = |axis: usize, count: usize| {
+            let at = (place[axis] - self.grid.origin[axis]) / self.grid.spacing[axis];
+            let [first, last] = [(at + ON_LINE).floor(), (at - ON_LINE).ceil()];
+            (first >= 0.0 && last < count as f64).then_some(first as usize..=last as usize)
+        };
+        let (columns, rows) = (range(0, self.grid.columns)?, range(1, self.grid.rows)?);
+        let width = self.grid.columns;
+        Some(rows.flat_map(move |row| columns.clone().map(move |column| row * width + column)))
+    }
+
+    fn cell_at(&self, place: [f64; 2]) -> Option<usize> {
+        let at = |axis: usize, count: usize| {
+            let k = ((place[axis] - self.grid.origin[axis]) / self.grid.spacing[axis]).round();
+            (k >= 0.0 && k < count as f64).then_some(k as usize)
+        };
+        Some(at(1, self.grid.rows)? * self.grid.columns + at(0, self.grid.columns)?)
+    }
+
+    /// The largest of some rectangles around a steppable cell within which a foot can stand on the same plane.
+    pub fn patch(&self, cell: usize) -> Patch {
+        let [x, y, height] = self.point(cell);
+        let [_, slope_x, slope_y] = self.planes[cell];
+        let patch =
+            Patch { center: [x, y], height, slope: [slope_x, slope_y], heading: 0.0, sides: [[0.0; 2]; 2] };
+        let area = |p: &Patch| (p.sides[0][1] - p.sides[0][0]) * (p.sides[1][1] - p.sides[1][0]);
+        (0..HEADINGS)
+            .map(|n| {
+                let heading = n as f64 / HEADINGS as f64 * std::f64::consts::FRAC_PI_2;
+                self.grown(Patch { heading, ..patch })
+            })
+            // The first one counts where several are equal.
+            .fold(None, |best: Option<Patch>, one| match best {
+                Some(best) if area(&best) >= area(&one) => Some(best),
+                _ => Some(one),
+            })
+            .unwrap_or(patch)
+    }
+
+    /// Whether the ground under a foot at a steppable cell is on a patch's plane.
+    fn fits(&self, cell: usize, patch: &Patch, under_foot: &[Offset]) -> bool {
+        let (columns, rows) = (self.grid.columns, self.grid.rows);
+        let (column, row) = (cell % columns, cell / columns);
+        self.steppable[cell]
+            && under_foot.iter().all(|&(u, v, _)| {
+                let clamped = |k: usize, by: isize, count: usize| k.saturating_add_signed(by).min(count - 1);
+                let (c, r) = (clamped(column, u, columns), clamped(row, v, rows));
+                let plane = patch.jet(self.grid.x(c), self.grid.y(r)).h;
+                (self.heights[r * columns + c] - plane).abs() <= self.needs.roughness
+            })
+    }
+
+    /// Moves the sides of a rectangle outward in turn, as long as all that it gains fits.
+    fn grown(&self, patch: Patch) -> Patch {
+        let step = self.grid.spacing[0].min(self.grid.spacing[1]);
+        let most = (self.needs.patch / step) as isize;
+        let axes = patch.axes();
+        let under_foot = under_foot(&self.grid, self.needs.even);
+        let fits = |u: isize, v: isize| {
+            let [x, y] = std::array::from_fn(|c| {
+                patch.center[c] + step * (u as f64 * axes[0][c] + v as f64 * axes[1][c])
+            });
+            self.cells_around([x, y]).is_some_and(|mut cells| cells.all(|cell| self.fits(cell, &patch, &under_foot)))
+        };
+        let (mut u, mut v) = ([0_isize; 2], [0_isize; 2]);
+        loop {
+            let before = (u, v);
+            for (side, outward) in [(1, 1), (0, -1)] {
+                if (u[side] + outward).abs() <= most && (v[0]..=v[1]).all(|v| fits(u[side] + outward, v)) {
+                    u[side] += outward;
+                }
+                if (v[side] + outward).abs() <= most && (u[0]..=u[1]).all(|u| fits(u, v[side] + outward)) {
+                    v[side] += outward;
+                }
+            }
+            if before == (u, v) {
+                break;
+            }
+        }
+        let side = |ends: [isize; 2]| {
+            [step * (ends[0] as f64 - CELL_FRACTION), step * (ends[1] as f64 + CELL_FRACTION)]
+        };
+        Patch { sides: [side(u), side(v)], ..patch }
+    }
+}
+
+/// The offsets of the nodes that the bilinear surface depends on within a distance of a node.
+fn under_foot(grid: &Grid, radius: f64) -> Vec<Offset> {
+    let [x, y] = grid.spacing;
+    let mut offsets = disc(grid, radius + x.hypot(y));
+    offsets.retain(|&(u, v, _)| {
+        let beside = |k: isize, spacing: f64| ((k.abs() - 1).max(0)) as f64 * spacing;
+        beside(u, x).hypot(beside(v, y)) < radius
+    });
+    offsets
+}
+
+/// The least-squares plane around each cell. Over a whole disc the sums of odd order vanish.
+fn planes(grid: &Grid, heights: &[f64], radius: f64) -> Vec<[f64; 3]> {
+    // At least the eight neighbors.
+    let radius = radius.max(1.01 * grid.spacing[0].hypot(grid.spacing[1]));
+    let around = disc(grid, radius);
+    let place = |(u, v, _): (isize, isize, f64)| (u as f64 * grid.spacing[0], v as f64 * grid.spacing[1]);
+    let (xx, yy) = around.iter().fold((0.0, 0.0), |(xx, yy), &o| {
+        let (x, y) = place(o);
+        (xx + x * x, yy + y * y)
+    });
+    let mut planes = vec![[0.0; 3]; heights.len()];
+    for_each_neighborhood(grid, &around, |cell, neighbors| {
+        let (mut sum, mut by_x, mut by_y) = (0.0, 0.0, 0.0);
+        for (n, i) in neighbors {
+            let (x, y) = place(around[n]);
+            sum += heights[i];
+            by_x += x * heights[i];
+            by_y += y * heights[i];
+        }
+        planes[cell] = [sum / around.len() as f64, by_x / xx, by_y / yy];
+    });
+    planes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { origin: [-1.0, -1.0], spacing: [0.02, 0.02], columns: 101, rows: 101 };
+    const NEEDS: FootNeeds =
+        FootNeeds { even: 0.033, roughness: 0.012, beside: 0.075, depth: 0.15, gap: 0.45, slope: 0.6, patch: 0.16 };
+
+    fn ground(h: impl Fn(f64, f64) -> f64) -> ContactGround {
+        ContactGround::new(&GRID, &GRID.sample(|x, y| Ok(h(x, y))).expect("heights"), NEEDS)
+    }
+
+    #[test]
+    fn feet_keep_away_from_edges_above_and_below() {
+        let ground = ground(|x, _| if x > 0.01 { 0.15 } else { 0.0 });
+        // Below the step by the wall's distance, above it by the foot's.
+        for (x, expected) in [(-0.08, true), (-0.06, false), (0.0, false), (0.04, false), (0.06, true)] {
+            assert_eq!(ground.is_steppable([x, 0.0]), expected, "x = {x}");
+        }
+        assert!(!ground.is_steppable([-0.96, 0.0]) && !ground.is_steppable([3.0, 0.0]));
+    }
+
+    #[test]
+    fn steep_and_rough_ground_is_not_steppable() {
+        assert!(!ground(|x, _| 0.65 * x).is_steppable([0.0, 0.0]));
+        let slope = ground(|x, y| 0.5 * x - 0.2 * y);
+        assert!(slope.is_steppable([0.0, 0.0]));
+        let plane = slope.plane(slope.cell_at([0.2, 0.1]).expect("a cell"));
+        assert!((plane[0] - 0.08).abs() < 1e-12 && (plane[1] - 0.5).abs() < 1e-12);
+        assert!(!ground(|x, _| 0.02 * (70.0 * x).sin()).is_steppable([0.0, 0.0]));
+    }
+
+    #[test]
+    fn a_patch_covers_a_turned_tread_and_nothing_else() {
+        // Treads of 0.3 m, turned by 0.5 rad.
+        let along = |x: f64, y: f64| 0.5_f64.cos() * x + 0.5_f64.sin() * y;
+        let ground = ground(|x, y| 0.15 * (along(x, y) / 0.3).floor());
+        let middle = [0.13 * 0.5_f64.cos(), 0.13 * 0.5_f64.sin()];
+        let seed = ground.steppable_cell(middle).expect("a steppable cell");
+        let patch = ground.patch(seed);
+        let [u, v] = patch.sides.map(|s| s[1] - s[0]);
+        assert!(u.min(v) > 0.1 && u.max(v) > 0.25, "{patch:?}");
+        for [x, y, z] in patch.corners() {
+            assert!((z - 0.0).abs() < 1e-9, "{patch:?}");
+            // A rectangle reaches a fraction of a cell beyond what is steppable, and the raster has the edge within a cell.
+            let tread = along(x, y);
+            assert!(tread > 0.03 && tread < 0.3 - 0.065, "{tread} of {patch:?}");
+        }
+    }
+}

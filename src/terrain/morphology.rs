@@ -1,0 +1,159 @@
+//! A raster as a ball feels it: which heights the ball can have, and averages over discs.
+
+use crate::heightfield::Grid;
+
+/// The Gaussian is cut off at this many standard deviations.
+const KERNEL_REACH: f64 = 3.0;
+
+/// Columns, rows and squared distance, m², from one cell to another.
+pub type Offset = (isize, isize, f64);
+
+/// The cells within a distance of one cell, as offsets of column and row, with their squared distances, m².
+pub fn disc(grid: &Grid, radius: f64) -> Vec<Offset> {
+    let reach = grid.spacing.map(|s| (radius / s + 1e-6) as isize);
+    let mut offsets = Vec::new();
+    for row in -reach[1]..=reach[1] {
+        for column in -reach[0]..=reach[0] {
+            let (x, y) = (column as f64 * grid.spacing[0], row as f64 * grid.spacing[1]);
+            let square = x * x + y * y;
+            if square <= (radius + 1e-9) * (radius + 1e-9) {
+                offsets.push((column, row, square));
+            }
+        }
+    }
+    offsets
+}
+
+/// The cells at some offsets from one cell, clamped to the raster: (number of the offset, index).
+pub struct Neighbors<'a> {
+    grid: &'a Grid,
+    offsets: std::iter::Enumerate<std::slice::Iter<'a, Offset>>,
+    column: isize,
+    row: isize,
+}
+
+impl Iterator for Neighbors<'_> {
+    type Item = (usize, usize);
+
+    fn next(&mut self) -> Option<(usize, usize)> {
+        let (n, &(u, v, _)) = self.offsets.next()?;
+        let column = (self.column + u).clamp(0, self.grid.columns as isize - 1);
+        let row = (self.row + v).clamp(0, self.grid.rows as isize - 1);
+        Some((n, row as usize * self.grid.columns + column as usize))
+    }
+}
+
+/// Visits every cell with its neighbors at some offsets.
+pub fn for_each_neighborhood(
+    grid: &Grid,
+    offsets: &[Offset],
+    mut visit: impl FnMut(usize, Neighbors),
+) {
+    for cell in 0..grid.len() {
+        let (column, row) = ((cell % grid.columns) as isize, (cell / grid.columns) as isize);
+        visit(cell, Neighbors { grid, offsets: offsets.iter().enumerate(), column, row });
+    }
+}
+
+/// The lowest height, m, that the bottom of a ball of this radius can have over each cell without entering the ground:
+/// max over d of h(x + d) + √(R² − d²) − R.
+pub fn rolled_over(grid: &Grid, heights: &[f64], radius: f64) -> Vec<f64> {
+    let offsets = disc(grid, radius);
+    let cap: Vec<f64> = offsets.iter().map(|o| (radius * radius - o.2).max(0.0).sqrt() - radius).collect();
+    let mut rolled = vec![0.0; heights.len()];
+    for_each_neighborhood(grid, &offsets, |cell, around| {
+        rolled[cell] = around.map(|(n, i)| heights[i] + cap[n]).fold(f64::NEG_INFINITY, f64::max);
+    });
+    rolled
+}
+
+/// The heights with all that is narrower than `width` m, along x or y, and lower than its surroundings filled: the greatest height
+/// within half of the width, then the least of these (a morphological closing by a square).
+pub fn closed(grid: &Grid, heights: &[f64], width: f64) -> Vec<f64> {
+    let extreme = |heights: Vec<f64>, pick: fn(f64, f64) -> f64| {
+        [[1, 0], [0, 1]].into_iter().enumerate().fold(heights, |heights, (axis, along)| {
+            let reach = (0.5 * width / grid.spacing[axis]) as isize;
+            let offsets: Vec<Offset> = (-reach..=reach).map(|k| (k * along[0], k * along[1], 0.0)).collect();
+            let mut result = heights.clone();
+            for_each_neighborhood(grid, &offsets, |cell, around| {
+                result[cell] = around.map(|(_, i)| heights[i]).fold(heights[cell], pick);
+            });
+            result
+        })
+    };
+    extreme(extreme(heights.to_vec(), f64::max), f64::min)
+}
+
+/// The average under a Gaussian of this standard deviation, m; beyond the border the outermost cells are repeated.
+pub fn averaged(grid: &Grid, heights: &[f64], deviation: f64) -> Vec<f64> {
+    let kernel = |spacing: f64| -> Vec<f64> {
+        let reach = (KERNEL_REACH * deviation / spacing).ceil() as isize;
+        let weights: Vec<f64> =
+            (-reach..=reach).map(|k| (-0.5 * (k as f64 * spacing / deviation).powi(2)).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter().map(|w| w / sum).collect()
+    };
+    let along_x = convolved(grid, heights, &kernel(grid.spacing[0]), [1, 0]);
+    convolved(grid, &along_x, &kernel(grid.spacing[1]), [0, 1])
+}
+
+fn convolved(grid: &Grid, heights: &[f64], kernel: &[f64], axis: [isize; 2]) -> Vec<f64> {
+    let reach = kernel.len() as isize / 2;
+    let offsets: Vec<_> = (-reach..=reach).map(|k| (k * axis[0], k * axis[1], 0.0)).collect();
+    let mut result = vec![0.0; heights.len()];
+    for_each_neighborhood(grid, &offsets, |cell, around| {
+        result[cell] = around.map(|(n, i)| kernel[n] * heights[i]).sum();
+    });
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { origin: [0.0, 0.0], spacing: [0.01, 0.01], columns: 60, rows: 40 };
+
+    fn raster(h: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        GRID.sample(|x, y| Ok(h(x, y))).expect("heights")
+    }
+
+    #[test]
+    fn a_ball_touches_an_edge_with_its_side() {
+        let radius = 0.05;
+        let rolled = rolled_over(&GRID, &raster(|x, _| if x >= 0.3 - 1e-9 { 0.2 } else { 0.0 }), radius);
+        for column in 0..60 {
+            let before_edge = 0.3 - 0.01 * column as f64;
+            let expected = if before_edge <= 1e-9 {
+                0.2
+            } else if before_edge <= radius + 1e-9 {
+                0.2 + (radius * radius - before_edge * before_edge).max(0.0).sqrt() - radius
+            } else {
+                0.0
+            };
+            assert!((rolled[20 * 60 + column] - expected).abs() < 1e-9, "column {column}");
+        }
+    }
+
+    #[test]
+    fn narrow_gaps_are_filled_and_steps_stay() {
+        let gap = |width: f64| closed(&GRID, &raster(|x, _| if (x - 0.3).abs() < 0.5 * width { -0.4 } else { 0.0 }), 0.1);
+        assert!(gap(0.08).iter().all(|h| *h == 0.0));
+        assert!(gap(0.15).iter().any(|h| *h < -0.3));
+        let step = raster(|x, _| if x > 0.3 { 0.2 } else { 0.0 });
+        assert_eq!(closed(&GRID, &step, 0.1), step);
+    }
+
+    #[test]
+    fn averages_keep_planes_inside_and_the_sum_of_a_spike() {
+        let plane = raster(|x, y| 0.3 * x - 0.2 * y);
+        let smooth = averaged(&GRID, &plane, 0.02);
+        for (row, column) in [(20, 30), (12, 14), (25, 45)] {
+            assert!((smooth[row * 60 + column] - plane[row * 60 + column]).abs() < 1e-12);
+        }
+        let mut spike = vec![0.0; GRID.len()];
+        spike[20 * 60 + 30] = 1.0;
+        let smooth = averaged(&GRID, &spike, 0.02);
+        assert!((smooth.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        assert!((smooth[20 * 60 + 32] / smooth[20 * 60 + 30] - (-0.5_f64).exp()).abs() < 1e-9);
+    }
+}
