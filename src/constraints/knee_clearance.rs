@@ -6,10 +6,11 @@
 //!
 //! v(r) is a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]: the knee with its radius, and the
 //! shank's outermost corner. Over ground with edges, n_z is left out, h is the surface over which a ball of the knee's or the
-//! foot's size rolls, and near edges further points between the corner and the foot are constrained: an edge can reach
-//! between corner and foot. Legs that the robot's file does not describe have no rows.
+//! foot's size rolls, and near edges points on the axis of the shank's tube are constrained as well: an edge can reach between knee
+//! and foot. Legs that the robot's file does not describe have no rows.
 //!
-//! Rows: knee, corner for each foot at every `STRIDE`-th sample; near edges knee, corner and further points at every sample; m.
+//! Rows: knee, corner for each foot at every `STRIDE`-th sample; near edges knee, corner and tube at every sample, and in
+//! swing also halfway to the next; m.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -30,8 +31,8 @@ use crate::trajectory::rotation::cross_matrix;
 /// Every how many samples there are rows.
 const STRIDE: usize = 2;
 
-/// Near edges, further points of the shank: fractions of the way from its corner to the foot.
-const ALONG_SHANK: [f64; 5] = [0.17, 0.34, 0.51, 0.68, 0.85];
+/// Near edges, points on the axis of the shank's tube: fractions of the way from its upper end to the foot.
+const ALONG_TUBE: [f64; 6] = [0.0, 0.17, 0.34, 0.51, 0.68, 0.85];
 
 /// The clearance of knees and shanks.
 #[derive(Clone, Debug)]
@@ -61,6 +62,11 @@ impl KneeClearance {
                 if near_edge || k % STRIDE == 0 {
                     places.push(LegPlace { foot, at: k.into(), leg, near_edge });
                 }
+                // A swinging leg moves by a hand's breadth from sample to sample.
+                let swings = matches!(model.layout.phase[foot][k], Phase::Swing(_));
+                if near_edge && swings && k < model.layout.intervals {
+                    places.push(LegPlace { foot, at: Instant::Between(k), leg, near_edge });
+                }
             }
         }
         let mut offsets = vec![0];
@@ -89,15 +95,15 @@ fn is_near_edge(model: &Model, foot: usize, k: usize, shank: f64) -> bool {
 
 impl LegPlace {
     fn rows(&self) -> usize {
-        if self.near_edge { 2 + ALONG_SHANK.len() } else { 2 }
+        if self.near_edge { 2 + ALONG_TUBE.len() } else { 2 }
     }
 
-    /// The points v(r): knee, corner, and near edges the others.
+    /// The points v(r): knee, corner, and near edges those of the tube.
     fn points<T: Scalar>(&self, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
-        let Leg { corner, shank, .. } = self.leg;
+        let Leg { corner, tube, shank, .. } = self.leg;
         let posture = self.leg.posture(r);
-        let toward_foot = move |s: &f64| [corner[0] + s * (shank - corner[0]), (1.0 - s) * corner[1]];
-        let others = if self.near_edge { &ALONG_SHANK[..] } else { &[] };
+        let toward_foot = move |s: &f64| [tube[0] + s * (shank - tube[0]), (1.0 - s) * tube[1]];
+        let others = if self.near_edge { &ALONG_TUBE[..] } else { &[] };
         let on_shank = [[0.0, 0.0], corner].into_iter().chain(others.iter().map(toward_foot));
         on_shank.map(move |point| posture.on_shank(point))
     }
@@ -171,6 +177,8 @@ impl Constraint for KneeClearance {
         lower.fill(margins::KNEE_CLEARANCE);
         for (place, first) in self.numbered() {
             lower[first] += place.leg.knee_radius;
+            let tube = place.leg.tube_radius.unwrap_or(place.leg.foot_radius) + margins::SHANK_CLEARANCE;
+            lower[first + 2..first + place.rows()].fill(tube);
         }
         upper.fill(f64::INFINITY);
     }

@@ -13,6 +13,8 @@ pub const REACH_SWINGING: f64 = 0.015;
 pub const BASE_CLEARANCE: f64 = 0.01;
 /// Between knee or shank and the ground, m: for what happens between the samples, and the ground's curvature across the shank.
 pub const KNEE_CLEARANCE: f64 = 0.02;
+/// Between the shank's tube and ground with edges, m: the surface for it has a margin to the sides already.
+pub const SHANK_CLEARANCE: f64 = 0.01;
 /// Fraction of a joint's speed limit that a plan uses. The rest is for what happens between samples and for what the plan
 /// does not know: the legs' own mass moves the trunk relative to the center of mass.
 pub const JOINT_SPEED: f64 = 0.72;

@@ -42,6 +42,14 @@ pub struct Leg {
     /// The outermost corner of the shank from the KFE axis: along the line to the center of the foot, and across it toward the outside of
     /// the bend.
     pub corner: [f64; 2],
+    /// The upper end of the axis of the shank's tube, in the coordinates of `corner`; the axis leads to the center of the foot. Default:
+    /// the knee.
+    #[serde(default)]
+    pub tube: [f64; 2],
+    /// Radius of that tube; default: that of the foot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub tube_radius: Option<f64>,
     /// +1 if the shank points further forward than the thigh, −1 if it points further back.
     pub bend: f64,
     /// Of the foot.
@@ -185,6 +193,8 @@ mod tests {
         shank: 0.33,
         knee_radius: 0.06,
         corner: [0.06, 0.1],
+        tube: [0.0, 0.0],
+        tube_radius: None,
         bend: -1.0,
         foot_radius: 0.03,
         speed_limit: 10.0,

@@ -28,6 +28,8 @@ pub struct BasePath<'a> {
     yaw: [f64; 2],
     /// When the base departs and when it arrives, s.
     travel: [f64; 2],
+    /// Length of the way, m; a turn counts as the way of the feet. At least a millimeter.
+    pub length: f64,
     /// Fraction of the way covered at each sample, if not by steady travel.
     timing: Option<Vec<f64>>,
 }
@@ -59,8 +61,17 @@ impl<'a> BasePath<'a> {
         let last_touch_down = swings().map(|s| s.end).reduce(f64::max);
         let depart = first_lift_off.map_or(0.0, |k| k * layout.time_step - LEAD).max(0.0);
         let arrive = last_touch_down.map_or(horizon, |k| k * layout.time_step + LEAD).min(horizon);
-        let path =
-            Self { model, ends: [first, last], yaw: [yaw, goal_yaw], travel: [depart, arrive], timing: None };
+        let [from, to] = [scenario.start.position, scenario.goal.position];
+        let feet = model.nominal.iter().map(|n| n.xy().norm()).fold(0.0, f64::max);
+        let turn = wrapped(goal_yaw - yaw).abs() * feet;
+        let path = Self {
+            model,
+            ends: [first, last],
+            yaw: [yaw, goal_yaw],
+            travel: [depart, arrive],
+            length: ((to[0] - from[0]).hypot(to[1] - from[1]) + turn).max(1e-3),
+            timing: None,
+        };
         Ok(if model.patches.is_empty() { path } else { path.retimed(&model.patches) })
     }
 
@@ -79,13 +90,6 @@ impl<'a> BasePath<'a> {
         Self { timing, ..self.clone() }
     }
 
-    /// Length of the way, m; a turn counts as the way of the feet. At least a millimeter.
-    pub fn length(&self) -> f64 {
-        let [from, to] = [0.0, 1.0].map(|u| self.pose_on_way(u).position.xy());
-        let feet = self.model.nominal.iter().map(|n| n.xy().norm()).fold(0.0, f64::max);
-        let turn = wrapped(self.yaw[1] - self.yaw[0]).abs() * feet;
-        ((to - from).norm() + turn).max(1e-3)
-    }
 
     /// How long the base travels, s.
     pub fn travel_time(&self) -> f64 {
@@ -94,7 +98,7 @@ impl<'a> BasePath<'a> {
 
     /// How far the base is on its way at time t, s, when it travels steadily, m.
     pub fn steady(&self, t: f64) -> f64 {
-        self.length() * progress(t, self.travel[0], self.travel[1])
+        self.length * progress(t, self.travel[0], self.travel[1])
     }
 
     /// A horizontal unit vector across the way: to the left of the heading in its middle.

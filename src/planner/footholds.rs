@@ -178,7 +178,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(model: &'a Model, contact: &'a ContactGround, path: &'a BasePath<'a>) -> Self {
         let half = model.reach.iter().map(|r| r.half_size[0]).fold(f64::INFINITY, f64::min);
-        let length = path.length();
+        let length = path.length;
         let count = (length / (APART * half)).ceil().max(1.0);
         let apart = length / count;
         // Feet can be ahead of and behind the ends of the way by as much as they reach.
@@ -228,7 +228,7 @@ impl<'a> Search<'a> {
             }
             standing[switch.foot] = switch.begins.is_some();
         }
-        let length = self.path.length();
+        let length = self.path.length;
         let end = |partial: &Partial| {
             partial.cost + BEYOND * distance(partial.interval, length).powi(2)
         };
@@ -275,7 +275,7 @@ impl<'a> Search<'a> {
     /// Lets the base travel for some time, s, while some feet stand.
     fn travel(&self, partial: &mut Partial, standing: &[bool], elapsed: f64) {
         let [least, most] = partial.interval;
-        let mut interval = [least, (most + self.fastest() * elapsed).min(self.path.length())];
+        let mut interval = [least, (most + self.fastest() * elapsed).min(self.path.length)];
         for (foot, place) in partial.places.iter().enumerate().filter(|(foot, _)| standing[*foot]) {
             partial.cost += BEYOND * narrow(&mut interval, self.within_reach(foot, place)).powi(2);
         }
@@ -291,7 +291,7 @@ impl<'a> Search<'a> {
     }
 
     fn fastest(&self) -> f64 {
-        FASTEST * self.path.length() / self.path.travel_time()
+        FASTEST * self.path.length / self.path.travel_time()
     }
 
     /// Extends all partial plans by all footholds, and keeps the best.
@@ -308,7 +308,7 @@ impl<'a> Search<'a> {
         let mut nearest = None;
         for (n, partial) in beam.iter().enumerate() {
             let at = begin.clamp(partial.interval[0], partial.interval[1]);
-            let wanted = (mid + KEPT_LAG * (at - begin)).min(self.path.length());
+            let wanted = (mid + KEPT_LAG * (at - begin)).min(self.path.length);
             let late = LATE * (at - begin).powi(2);
             nearest.get_or_insert(wanted);
             for place in self.places_around(foot, wanted) {
@@ -316,7 +316,7 @@ impl<'a> Search<'a> {
                 let within_reach = self.within_reach(foot, &place);
                 let mut lacking = narrow(&mut interval, within_reach);
                 if stays {
-                    lacking += distance(within_reach, self.path.length());
+                    lacking += distance(within_reach, self.path.length);
                 }
                 let base = begin.clamp(interval[0], interval[1]);
                 let cost = partial.cost
@@ -417,7 +417,7 @@ impl<'a> Search<'a> {
 
 /// The longest and the highest step of a foot, m.
 fn largest_step(model: &Model, path: &BasePath, foot: usize) -> [f64; 2] {
-    let travel = path.length() / path.travel_time() * model.layout.longest_cycle(foot);
+    let travel = path.length / path.travel_time() * model.layout.longest_cycle(foot);
     let longest = (LONGEST * 2.0 * model.reach[foot].half_size[0]).max(travel);
     [longest, HIGHEST * -model.nominal[foot].z]
 }

@@ -35,7 +35,7 @@ const COST_SCALE: f64 = 1e3;
 /// Weight of the swings' acceleration, relative to that of the base's.
 const SWING_WEIGHT: f64 = 1e-3;
 /// The same over ground with edges, where swings are higher and longer: joints and controller must follow them.
-const SWING_WEIGHT_OVER_EDGES: f64 = 1e-2;
+const SWING_WEIGHT_OVER_EDGES: f64 = 3e-2;
 /// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
 const POSTURE_WEIGHT: f64 = 100.0;
 

@@ -9,6 +9,8 @@ use crate::scenario::Effort;
 const SMOOTH_WINDOW: usize = 4;
 /// See [`SMOOTH_WINDOW`].
 const SMOOTH_GAIN: f64 = 0.02;
+/// Not while the dual infeasibility is larger than this: the steps are then short because Ipopt regularizes an indefinite Hessian.
+const SMOOTH_DUAL: f64 = 1.0;
 
 /// Watches the iterations of one stage.
 pub(super) struct StoppingRule {
@@ -40,7 +42,7 @@ impl StoppingRule {
         self.satisfied = match self.effort {
             _ if !self.with_costs => true,
             Effort::Feasible => true,
-            Effort::Smooth => self.has_stalled(),
+            Effort::Smooth => record.dual_infeasibility <= SMOOTH_DUAL && self.has_stalled(),
             Effort::Optimal => false,
         };
         if self.satisfied { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -33,7 +33,7 @@ const ENVELOPE: f64 = 0.4;
 /// Distance of a contact point from a wall: beyond it, the smoothed path of the ball is on the ground.
 const BESIDE: f64 = BALL + 2.5 * ENVELOPE;
 /// The knee's margin beyond its own radius.
-const KNEE_MARGIN: f64 = 0.5;
+const KNEE_MARGIN: f64 = 1.0;
 
 /// Standard deviation of the smoothing of the posture ground, in standing heights.
 const POSTURE: f64 = 0.35;
@@ -108,7 +108,7 @@ impl Surfaces {
         Ok(Self {
             posture: surface(&posture(&contact, heights, POSTURE * robot.standing_height())?)?,
             feet: envelope(BALL * foot, LEAST_BALL * foot)?,
-            knees: envelope(knee + KNEE_MARGIN * foot, knee)?,
+            knees: envelope(knee + KNEE_MARGIN * foot, knee + 0.5 * KNEE_MARGIN * foot)?,
             contact: Some(Arc::new(contact)),
         })
     }

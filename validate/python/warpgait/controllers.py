@@ -21,6 +21,7 @@ from .reference import Reference
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
 EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touch-down
+EARLY = 0.6  # fraction of a swing after which a contact is the touch-down: the foot stands
 
 _UNBOUNDED = 1e30  # DAQP's infinity
 _EQUALITY = 5  # DAQP's flags: active and immutable
@@ -53,7 +54,8 @@ class Gains:
     rotation: tuple[float, float] = (20.0, 9.0)
     swing: tuple[float, float] = (350.0, 32.0)
     stance_damping: float = 20.0
-    reach_down: float = 0.01  # m below the plan, the target of a stance foot that does not touch the ground yet
+    reach_down: float = 0.01  # m below the plan, the target of a stance foot that does not touch the ground yet …
+    seek: tuple[float, float] = (0.25, 0.05)  # m/s, m: … and how fast and how far it goes on down until it touches
     touch_force: float = 20.0  # N, the largest normal force that is asked of such a foot
     step_over: tuple[float, float] = (2.0, 0.05)  # m/s, m: how fast and how far a foot rises that meets an edge
     weight_com: float = 100.0
@@ -66,6 +68,15 @@ class Gains:
     joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
 
 
+def swing_progress(reference: Reference) -> Array:
+    """Fraction (K, E) of the current swing that is over; zero in stance."""
+    progress = np.zeros(reference.contact.shape)
+    for e in range(progress.shape[1]):
+        for first, end in runs(~reference.contact[:, e]):
+            progress[first:end, e] = np.arange(end - first) / (end - first)
+    return progress
+
+
 class StepOver:
     """Lifts a foot that touches something in the first half of its swing: an edge that the plan does not know, which would hold it back.
 
@@ -74,11 +85,7 @@ class StepOver:
 
     def __init__(self, reference: Reference, speed: float, limit: float) -> None:
         """`speed` m/s and `limit` m of the rise."""
-        self._contact = reference.contact
-        self._progress = np.zeros(reference.contact.shape)  # fraction of the current swing that is over
-        for e in range(reference.contact.shape[1]):
-            for first, end in runs(~reference.contact[:, e]):
-                self._progress[first:end, e] = np.arange(end - first) / (end - first)
+        self._contact, self._progress = reference.contact, swing_progress(reference)
         self._step, self._speed, self._limit = speed * float(reference.t[1]), speed, limit
         self._met = np.zeros(reference.contact.shape[1], bool)
         self._risen = np.zeros(reference.contact.shape[1])
@@ -90,6 +97,23 @@ class StepOver:
         rising = self._met & (self._risen < self._limit)
         self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
         return (1 - smootherstep(s)) * self._risen, np.where(rising, self._speed, 0.0)
+
+
+class TouchDown:
+    """Feet that meet the ground earlier or later than planned, because it is higher or lower than in the plan."""
+
+    def __init__(self, progress: Array, step: float, speed: float, limit: float) -> None:
+        """`progress` (K, E): fraction of the current swing that is over; `speed` m/s and `limit` m of the search downward."""
+        self._progress, self._step, self._speed, self._limit = progress, step, speed, limit
+        self.early = np.zeros(progress.shape[1], bool)  # stands before the plan has it stand
+        self.sought = np.zeros(progress.shape[1])  # m below the plan's foothold
+
+    def update(self, k: int, contact: Bools, touching: Bools) -> None:
+        """`contact` (E,): which feet the plan has standing at control step k. Call once a step."""
+        self.early = ~contact & (self.early | (touching & (self._progress[k] > EARLY)))
+        seeking = contact & ~touching
+        further = np.minimum(self.sought + self._speed * self._step, self._limit)
+        self.sought = np.where(seeking, further, np.where(contact, self.sought, 0.0))
 
 
 class Controller(Protocol):
@@ -135,6 +159,7 @@ class WholeBody:
         self._cones_in_the_air = friction_cones(reference.normal, FRICTION_IN_THE_AIR)
         self._last = np.zeros((E, 3))
         self._step_over = StepOver(reference, *self.gains.step_over)
+        self._touch_down = TouchDown(swing_progress(reference), float(reference.t[1]), *self.gains.seek)
 
     def torque(self, k: int, data: Any, touching: Bools) -> Array:
         """See `Controller.torque`. Without a solution, the torques of the step before are kept.
@@ -143,7 +168,8 @@ class WholeBody:
         """
         mujoco.mj_fullM(self.model, data, self._M)
         bias = data.qfrc_bias - data.qfrc_passive
-        stance = np.flatnonzero(self.reference.contact[k])
+        self._touch_down.update(k, self.reference.contact[k], touching)
+        stance = np.flatnonzero(self.reference.contact[k] | self._touch_down.early)
         weights = np.array(self._base_tasks(k, data, bias) + self._foot_tasks(k, data, touching))
         H, gradient = self._objective(k, stance, weights)
         C, lower, upper = self._constraints(k, stance, touching, bias)
@@ -178,7 +204,7 @@ class WholeBody:
         rise, rise_speed = self._step_over.update(k, touching)
         for e in range(len(index.feet)):
             center, normal = data.site_xpos[index.site[e]], ref.normal[k, e]
-            stance = ref.contact[k, e]
+            stance = ref.contact[k, e] or self._touch_down.early[e]
             point = center - index.radius * normal if stance else center
             J = self._contact_jacobian[e]
             mujoco.mj_jac(model, data, J, None, point, index.body[e])
@@ -188,7 +214,8 @@ class WholeBody:
                 wanted = -g.stance_damping * velocity
             else:
                 # A foot that is to stand but does not touch the ground yet reaches for it, a little below the plan.
-                target = ref.foot[k, e] + (rise[e] - g.reach_down * stance) * normal
+                down = stance * g.reach_down + self._touch_down.sought[e]
+                target = ref.foot[k, e] + (rise[e] - down) * normal
                 rate = ref.foot_velocity[k, e] + rise_speed[e] * normal
                 wanted = ref.foot_acceleration[k, e] + g.swing[0] * (target - center) + g.swing[1] * (rate - velocity)
             rows = slice(6 + 3 * e, 9 + 3 * e)

@@ -55,6 +55,8 @@ class ShankShape:
 
     knee_radius: float  # of the shapes around the KFE axis
     corner: tuple[float, float]  # of the shank, from that axis: along the line to the foot's center, and across it
+    tube: tuple[float, float]  # the upper end of the axis of the shank's longest round shape, which leads to the foot; the same way
+    tube_radius: float
 
 
 def geom_box(model: Any, geom: int) -> Box:
@@ -83,12 +85,36 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
         furthest = corners[np.argmax(corners @ outward)]
         if furthest @ outward > corner[1]:
             corner = (float(furthest @ foot), float(furthest @ outward))
+    tube, tube_radius = _tube(model, leg, foot, outward)
     # The lower end of the thigh turns about the same axis.
     axis = model.body_pos[body]
     for g in np.flatnonzero(model.geom_bodyid == model.body_parentid[body]):
         if np.hypot(*(model.geom_pos[g] - axis)[[0, 2]]) < KNEE_DISTANCE:
             radius = max(radius, float(model.geom_size[g][0]))
-    return ShankShape(radius, corner)
+    return ShankShape(radius, corner, tube, tube_radius)
+
+
+def _tube(model: Any, leg: Leg, foot: Array, outward: Array) -> tuple[tuple[float, float], float]:
+    """Upper end, along `foot` and `outward`, and radius of the longest cylinder or capsule of a shank.
+
+    Without one, the line from the knee to the foot, as thick as the foot.
+    """
+    foot_geom = model.geom(leg.name).id
+    round_shapes = [int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE)]
+    longest, end, radius = 0.0, (0.0, 0.0), float(model.geom_size[foot_geom][0])
+    for g in np.flatnonzero(model.geom_bodyid == model.geom_bodyid[foot_geom]):
+        half = float(model.geom_size[g][1])
+        if g == foot_geom or int(model.geom_type[g]) not in round_shapes or half <= longest:
+            continue
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[g])
+        axis = rotation.reshape(3, 3)[:, 2]
+        ends = [(model.geom_pos[g] + side * half * axis)[[0, 2]] for side in (-1, 1)]
+        if abs(axis[1]) > 0.5:  # across the leg, as the knee's drive
+            continue
+        upper = min(ends, key=lambda p: float(p @ foot))
+        longest, end, radius = half, (float(upper @ foot), float(upper @ outward)), float(model.geom_size[g][0])
+    return end, radius
 
 
 def trunk_box(model: Any) -> Box:
@@ -169,6 +195,8 @@ def _foot_lines(robot: CentroidalRobot, e: int) -> list[str]:
         f"shank = {leg.shank:.4f}                              # m",
         f"knee_radius = {robot.shank.knee_radius:.4f}                        # m",
         f"corner = {_row(np.array(robot.shank.corner), 4)}                  # m, of the shank, from the knee",
+        f"tube = {_row(np.array(robot.shank.tube), 4)}                    # m, upper end of the axis of the shank's tube, which leads to the foot",
+        f"tube_radius = {robot.shank.tube_radius:.4f}                        # m",
         f"bend = {leg.bend:.1f}                                  # the knee bends the shank forward (1) or back (-1)",
         f"foot_radius = {robot.radius:g}                         # m",
         f"speed_limit = {robot.speed_limit:.1f}                           # rad/s, each joint",
