@@ -34,7 +34,10 @@ fn feet(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, residu
             let first = *landed[e].get_or_insert(s.foot_position(n, e));
             slip.meet(1e3 * norm(sub(s.foot_position(n, e), first)), n, Some(e));
         } else {
-            penetration.meet(-over, n, Some(e));
+            // Over edges the foot counts as a ball: see `patches`.
+            if !s.has_edges() {
+                penetration.meet(-over, n, Some(e));
+            }
             landed[e] = None;
         }
     }

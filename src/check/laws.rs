@@ -63,7 +63,8 @@ laws! {
     PATCH_ROUGHNESS = "patch_roughness", "mm", Some(15.0), None,
         "difference of the raw ground under a standing foot from the plane of its patch";
     SWING_EDGE = "swing_edge", "mm", Some(0.1), None,
-        "a swinging foot, as a ball, stays above the raw ground (allowance for rounding: 0.1 mm)";
+        "a swinging foot, as a ball, stays above raw ground with edges, or is no deeper in it than next to it, where it stands \
+         (allowance for rounding: 0.1 mm)";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
     GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given";

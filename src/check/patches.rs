@@ -64,7 +64,6 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
         let stances = stance_numbers(s, e);
         let needed = stances[s.samples - 1] + usize::from(s.in_contact(s.samples - 1, e));
         missing.meet(needed.abs_diff(s.plan.patches[e].len()) as f64, 0, Some(e));
-        let directions = center_directions(s, e);
         let mut before = None;
         for n in 0..s.samples {
             let [x, y, _] = s.foot_position(n, e);
@@ -75,9 +74,10 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
                     raw.meet(1e3 * roughness(s, &patch, [x, y]), n, Some(e));
                     before = Some(stances[n]);
                 }
-            } else if !s.in_contact(n, e) {
-                cut.meet(1e3 * depth(s, s.foot_position(n, e), directions[n]), n, Some(e));
             }
+        }
+        for (n, depth) in swing_depths(s, e) {
+            cut.meet(1e3 * depth, n, Some(e));
         }
     }
     findings.push((laws::PATCH_COUNT, missing));
@@ -114,11 +114,13 @@ fn depth(s: &Subject, contact: [f64; 3], direction: [f64; 3]) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Unit vectors from the contact point to the center of a foot, (N,): the normal in stance, turning evenly from one to the next in
-/// swing.
-fn center_directions(s: &Subject, e: usize) -> Vec<[f64; 3]> {
+/// How deep a swinging foot is in the raw ground, by sample, m. The ground under a foothold need not be a plane, so that a foot may
+/// stand with a bump pressed into it; while it is within its radius of that foothold, what counts is how much deeper it is.
+fn swing_depths(s: &Subject, e: usize) -> Vec<(usize, f64)> {
     let normal = |n: usize| s.plan.foot_normal[n * s.feet + e];
-    let mut directions: Vec<[f64; 3]> = (0..s.samples).map(normal).collect();
+    let contact = |n: usize| s.foot_position(n, e);
+    let radius = s.plan.meta.robot.foot_radius;
+    let mut depths = Vec::new();
     let mut n = 0;
     while n < s.samples {
         let first = n;
@@ -126,14 +128,21 @@ fn center_directions(s: &Subject, e: usize) -> Vec<[f64; 3]> {
             n += 1;
         }
         if first > 0 && n > first && n < s.samples {
-            let (from, to) = (normal(first - 1), normal(n));
-            for (k, direction) in directions.iter_mut().enumerate().take(n).skip(first) {
+            let ends = [first - 1, n].map(|n| (contact(n), depth(s, contact(n), normal(n)).max(0.0)));
+            for k in first..n {
+                // The center turns evenly from one normal to the next.
                 let u = (k + 1 - first) as f64 / (n + 1 - first) as f64;
-                let turned = add(scale(1.0 - u, from), scale(u, to));
-                *direction = scale(1.0 / dot(turned, turned).sqrt(), turned);
+                let turned = add(scale(1.0 - u, normal(first - 1)), scale(u, normal(n)));
+                let direction = scale(1.0 / dot(turned, turned).sqrt(), turned);
+                let stood = ends
+                    .iter()
+                    .filter(|(foothold, _)| norm(sub(contact(k), *foothold)) <= radius)
+                    .map(|(_, depth)| *depth)
+                    .fold(0.0, f64::max);
+                depths.push((k, depth(s, contact(k), direction) - stood));
             }
         }
         n += 1;
     }
-    directions
+    depths
 }
