@@ -1,5 +1,6 @@
 //! Files that are written whole or not at all: each is written under a temporary name beside its target and then renamed.
 
+pub mod npy;
 pub mod npz;
 
 use std::fs::File;

@@ -1,14 +1,15 @@
 //! Archives of NumPy arrays (`.npz`): deflated zip files of `.npy` members that `numpy.load` reads.
 
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Read};
+use std::io::{BufWriter, Cursor, Read, Write};
+use std::iter::repeat;
 use std::path::{Path, PathBuf};
 
-use npyz::{DType, NpyFile, Order, WriterBuilder};
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
+use super::npy::{self, Header};
 use super::temporary_beside;
 use crate::{Error, Result};
 
@@ -35,9 +36,7 @@ impl NpzWriter {
         shape: &[usize],
         values: impl IntoIterator<Item = f64>,
     ) -> Result<()> {
-        self.add(name, shape, "<f8", |item: &mut dyn FnMut(&f64) -> std::io::Result<()>| {
-            values.into_iter().try_for_each(|v| item(&v))
-        })
+        self.add(name, shape, "<f8", values.into_iter().map(f64::to_le_bytes))
     }
 
     /// Adds an array of points, shape `(…, K)`.
@@ -53,50 +52,44 @@ impl NpzWriter {
 
     /// Adds an array of booleans.
     pub fn add_bool(&mut self, name: &str, shape: &[usize], values: &[bool]) -> Result<()> {
-        self.add(name, shape, "|b1", |item: &mut dyn FnMut(&bool) -> std::io::Result<()>| {
-            values.iter().try_for_each(item)
-        })
+        self.add(name, shape, "|b1", values.iter().map(|&v| [u8::from(v)]))
     }
 
     /// Adds an array of strings (`<U…`); an empty shape is a single string.
     pub fn add_str(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<()> {
         // NumPy has no strings of zero width.
         let width = values.iter().map(|s| s.chars().count()).max().unwrap_or(0).max(1);
-        self.add(name, shape, &format!("<U{width}"), |item: &mut dyn FnMut(&str) -> std::io::Result<()>| {
-            values.iter().try_for_each(|s| item(s))
-        })
+        let padded = |s: &String| {
+            let characters = s.chars().map(u32::from).chain(repeat(0)).take(width);
+            characters.flat_map(u32::to_le_bytes).collect::<Vec<u8>>()
+        };
+        self.add(name, shape, &format!("<U{width}"), values.iter().map(padded))
     }
 
-    fn add<T: npyz::Serialize + ?Sized>(
+    /// Adds an array of elements that are given as bytes.
+    fn add<T: AsRef<[u8]>>(
         &mut self,
         name: &str,
         shape: &[usize],
         dtype: &str,
-        push_all: impl FnOnce(&mut dyn FnMut(&T) -> std::io::Result<()>) -> std::io::Result<()>,
+        elements: impl IntoIterator<Item = T>,
     ) -> Result<()> {
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        let (mut bytes, mut count) = (Vec::new(), 0);
+        for element in elements {
+            bytes.extend(element.as_ref());
+            count += 1;
+        }
+        if count != shape.iter().product::<u64>() {
+            return Err(Error::Internal(format!("{name}: {count} values for the shape {shape:?}")));
+        }
+        let header = Header { dtype: dtype.into(), fortran_order: false, shape };
+        let header = header.write().map_err(|e| Error::Internal(format!("{name}: {e}")))?;
         let at = |e: std::io::Error| Error::io(&self.target, e);
         let zip = self.zip.as_mut().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
         zip.start_file(format!("{name}.npy"), options).map_err(|e| at(e.into()))?;
-        let dtype = dtype.parse().map_err(|e| Error::Internal(format!("dtype {dtype}: {e}")))?;
-        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
-        let mut array = npyz::WriteOptions::<T>::new()
-            .dtype(DType::Plain(dtype))
-            .shape(&shape)
-            .writer(&mut *zip)
-            .begin_nd()
-            .map_err(at)?;
-        let expected: u64 = shape.iter().product();
-        let mut count = 0;
-        push_all(&mut |value| {
-            count += 1;
-            array.push(value)
-        })
-        .map_err(at)?;
-        if count != expected {
-            return Err(Error::Internal(format!("{name}: {count} values for the shape {shape:?}")));
-        }
-        array.finish().map_err(at)
+        zip.write_all(&header).and_then(|()| zip.write_all(&bytes)).map_err(at)
     }
 
     /// Closes the archive and renames it to its target.
@@ -155,7 +148,8 @@ impl NpzReader {
 
     /// A float64 array with its shape; NaN and infinities are allowed.
     pub fn any_f64(&mut self, name: &str) -> Result<(Vec<usize>, Vec<f64>)> {
-        self.read(name, "float64 (<f8)", |dtype| dtype == "<f8")
+        let width = |dtype: &str| (dtype == "<f8").then_some(8);
+        self.read(name, "float64 (<f8)", width, |bytes| Some(f64::from_le_bytes(bytes.try_into().ok()?)))
     }
 
     /// A float64 array of finite values with its shape.
@@ -183,28 +177,41 @@ impl NpzReader {
 
     /// An array of booleans of a known shape.
     pub fn bool(&mut self, name: &str, shape: &[usize]) -> Result<Vec<bool>> {
-        let (found, values) = self.read(name, "bool (|b1)", |dtype| dtype == "|b1")?;
+        let width = |dtype: &str| (dtype == "|b1").then_some(1);
+        let (found, values) = self.read(name, "bool (|b1)", width, |bytes| match bytes {
+            [0] => Some(false),
+            [1] => Some(true),
+            _ => None,
+        })?;
         self.expect_shape(name, &found, shape)?;
         Ok(values)
     }
 
     /// An array of strings with its shape.
     pub fn str(&mut self, name: &str) -> Result<(Vec<usize>, Vec<String>)> {
-        self.read(name, "str (<U…)", |dtype| dtype.starts_with("<U"))
+        let width =
+            |dtype: &str| dtype.strip_prefix("<U")?.parse::<usize>().ok()?.checked_mul(4).filter(|&n| n > 0);
+        self.read(name, "str (<U…)", width, |bytes| {
+            let characters = bytes.as_chunks().0.iter().map(|&c| char::from_u32(u32::from_le_bytes(c)));
+            Some(characters.collect::<Option<String>>()?.trim_end_matches('\0').to_owned())
+        })
     }
 
     fn expect_shape(&self, name: &str, found: &[usize], expected: &[usize]) -> Result<()> {
         if found == expected {
             return Ok(());
         }
+        let tuple = |shape: &[usize]| npy::tuple(&shape.iter().map(|&n| n as u64).collect::<Vec<_>>());
         Err(self.error(name, format!("shape {}, expected {}", tuple(found), tuple(expected))))
     }
 
-    fn read<T: npyz::Deserialize>(
+    /// Reads a member whose elements take as many bytes as `width` tells from the dtype, if it is the right one.
+    fn read<T>(
         &mut self,
         name: &str,
         wanted: &str,
-        accept: impl Fn(&str) -> bool,
+        width: impl Fn(&str) -> Option<usize>,
+        element: impl Fn(&[u8]) -> Option<T>,
     ) -> Result<(Vec<usize>, Vec<T>)> {
         let member = self.zip.by_name(&format!("{name}.npy")).and_then(|mut member| {
             let mut content = Vec::new();
@@ -216,43 +223,23 @@ impl NpzReader {
             Err(ZipError::FileNotFound) => return Err(self.error(name, "missing")),
             Err(e) => return Err(self.error(name, format!("damaged or truncated: {e}"))),
         };
-        let mut rest = Cursor::new(&content[..]);
-        let header = npyz::NpyHeader::from_reader(&mut rest)
-            .map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
-        let dtype = match header.dtype() {
-            DType::Plain(plain) => plain.to_string(),
-            other => other.descr(),
-        };
-        if !accept(&dtype) {
+        let (header, data) =
+            Header::read(&content).map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
+        let Header { dtype, fortran_order, shape } = &header;
+        let Some(width) = width(dtype) else {
             return Err(self.error(name, format!("dtype {dtype}, expected {wanted}")));
-        }
-        let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
-        if header.order() != Order::C && shape.len() > 1 {
+        };
+        if *fortran_order && shape.len() > 1 {
             return Err(self.error(name, "stored in Fortran order, expected C order"));
         }
         // The size must fit before anything is allocated for it.
-        let width = item_size(&dtype);
-        let bytes = shape.iter().try_fold(width, |product, &n| product.checked_mul(n));
-        let available = content.len() - rest.position() as usize;
-        if bytes != Some(available) {
-            return Err(self
-                .error(name, format!("{available} bytes of data do not make {} of {dtype}", tuple(&shape))));
+        if header.num_bytes(width) != Some(data.len()) {
+            let (bytes, shape) = (data.len(), npy::tuple(shape));
+            return Err(self.error(name, format!("{bytes} bytes of data do not make {shape} of {dtype}")));
         }
-        let values = NpyFile::with_header(header, rest).into_vec::<T>().map_err(|e| self.error(name, e))?;
-        Ok((shape, values))
-    }
-}
-
-/// Bytes of one element of a dtype such as `<f8`, `|b1` or `<U12`.
-fn item_size(dtype: &str) -> usize {
-    let digits: usize = dtype.get(2..).and_then(|n| n.parse().ok()).unwrap_or(0);
-    if dtype.contains('U') { digits.saturating_mul(4) } else { digits }
-}
-
-fn tuple(shape: &[usize]) -> String {
-    match shape {
-        [n] => format!("({n},)"),
-        _ => format!("({})", shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+        let values: Option<Vec<T>> = data.chunks_exact(width).map(element).collect();
+        let values = values.ok_or_else(|| self.error(name, format!("an element is no {wanted}")))?;
+        Ok((shape.iter().map(|&n| n as usize).collect(), values))
     }
 }
 

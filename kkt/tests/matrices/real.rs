@@ -4,9 +4,7 @@
 //! A file has little-endian numbers: `u32` variables, inequalities, equations, entries, matrices; `u16` row and column of each entry, from 0; `f32`
 //! values of each entry, matrix after matrix.
 
-mod common;
-
-use common::{Matrix, Random};
+use super::common::{Matrix, Random};
 use kkt::Factored;
 
 /// Of each file the layout and the matrices.
@@ -29,7 +27,7 @@ fn read(bytes: &[u8]) -> Vec<Matrix> {
 fn matrices_of_real_solves() {
     let mut random = Random(1);
     let mut wrong = 0;
-    for bytes in [&include_bytes!("data/rubble.bin")[..], &include_bytes!("data/joints.bin")[..]] {
+    for bytes in [&include_bytes!("../data/rubble.bin")[..], &include_bytes!("../data/joints.bin")[..]] {
         let matrices = read(bytes);
         let mut kkt = matrices[0].kkt();
         let layout = matrices[0].layout;

@@ -1,8 +1,6 @@
 //! Random saddle-point matrices of every kind against dense eigenvalues.
 
-mod common;
-
-use common::{Matrix, Random};
+use super::common::{Matrix, Random};
 use kkt::{Error, Factored, Kkt, Layout};
 
 /// What to make of the parts of a matrix.
