@@ -1,6 +1,6 @@
 //! The check: a good plan passes every law; a plan that breaks one law fails that one and no other.
 
-use crate::common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
+use crate::common::{FEET, GRAVITY, MASS, ask, lifting, on_slope, standing};
 use warpgait::check::{CheckLimits, LAWS, check, check_with};
 use warpgait::plan::Plan;
 
@@ -202,6 +202,10 @@ fn every_law_of_the_table_is_reported() {
     let mut plan = lifting(0.08);
     ask(&mut plan, "contact", "max_slope = 1.0");
     plan.meta.scenario = plan.meta.scenario.replace("[goal]", "[goal]\nyaw = 0.0");
+    let around = |[x, y]: [f64; 2]| {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[u, v]| [x + 0.1 * u, y + 0.1 * v, 0.0])
+    };
+    plan.patches = FEET.map(|foot| vec![around(foot); 2]).to_vec();
     let report = check(&plan).unwrap();
     let mut reported: Vec<&str> =
         report.rows.iter().chain(&report.figures).map(|row| row.name.as_str()).collect();

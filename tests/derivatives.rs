@@ -1,19 +1,15 @@
 //! Every constraint and cost, in both formulations, on curved terrains, at random points, against central differences: first
 //! and second derivatives, with NaN-poisoned buffers, and no entry missing from the patterns.
 
-use std::sync::Arc;
-
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use warpgait::ipopt::NlpProblem;
 use warpgait::nlp::Constraint;
-use warpgait::nlp::Model;
-use warpgait::planner::problem::Choice;
-use warpgait::planner::{GaitProblem, derivatives, guess};
+use warpgait::planner::{GaitProblem, Task, derivatives};
 use warpgait::robot::Robot;
-use warpgait::scenario::Scenario;
+use warpgait::scenario::{Formulation, Scenario};
 use warpgait::terrain::Surfaces;
-use warpgait::trajectory::{Gait, Spaces};
+use warpgait::trajectory::Gait;
 use warpgait::warp::WarpMap;
 
 /// Largest relative error allowed; the step of the differences is 1e-5, their own error some 1e-9.
@@ -43,14 +39,13 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let scenario: Scenario = toml::from_str(&text).expect("a scenario");
     let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
     let ground = warpgait::terrain::build(&scenario, ".".as_ref()).expect("a ground");
-    let field = Arc::new(ground.field);
+    let surfaces = Surfaces::of(&scenario, &robot, &ground).expect("surfaces");
     // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
-    let map = bent(&WarpMap::shear(&field, &scenario.map).expect("a map"));
-    let spaces = Spaces::of(scenario.formulation, Some(Arc::new(map))).expect("spaces");
+    let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));
     let gait = Gait::of(&scenario, &robot).expect("a gait");
-    let model = Model::new(&scenario, &robot, &gait, Surfaces::one(field), spaces);
-    let x = guess::guess(&scenario, &model).expect("a guess");
-    GaitProblem::new(&scenario, model, x, Choice { with_costs: true, exact_hessian: true })
+    let map = (scenario.formulation != Formulation::Direct).then_some(&map);
+    let task = Task { scenario: &scenario, robot: &robot, gait: &gait, surfaces: &surfaces, map };
+    task.problem().expect("a problem")
 }
 
 /// The map with its control points moved smoothly in all three coordinates.
@@ -163,6 +158,26 @@ fn direct_blocks_match_differences_on_all_terrains() {
 fn hybrid_blocks_match_differences_on_all_terrains() {
     for (name, terrain) in TERRAINS {
         check(problem(terrain, "hybrid", "[contact]\nmax_slope = 0.9"), name);
+    }
+}
+
+/// With edges: patches, surfaces for swings and knees, and points of the shanks' tubes. The map is bent over the posture surface.
+#[test]
+fn blocks_over_edges_match_differences() {
+    let steps = "kind = \"formula\"\nexpression = \"0.04*floor(4*x + y) + 0.02*x\"";
+    for formulation in ["warped", "direct", "hybrid"] {
+        for robot in ["anymal_towr", "anymal_b", "anymal_c"] {
+            let extra = "[contact]\nfootholds = \"patches\"";
+            let problem = problem_of(robot, steps, formulation, extra);
+            let rows = |name: &str| {
+                let found = problem.blocks().find(|(block, _)| block.name() == name);
+                found.map_or(0, |(block, _)| block.rows())
+            };
+            assert!(rows("foothold patch") > 0 && rows("foothold slope") == 0);
+            // More than knee and corner at every second sample.
+            assert!(robot == "anymal_towr" || rows("knee clearance") > 2 * 4 * 26, "{robot}");
+            check(problem, &format!("{robot}, edges, {formulation}"));
+        }
     }
 }
 

@@ -7,11 +7,13 @@ use png::{BitDepth, ColorType};
 use warpgait::scenario;
 use warpgait::terrain::{Ground, build};
 
-/// The ground of a scenario whose `[terrain]` has these lines.
+/// The ground of a scenario whose `[terrain]` has these lines, as one smooth surface.
 fn ground(text: &str, folder: &Path) -> Ground {
-    let whole = format!("[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n");
+    let whole = format!(
+        "[contact]\nfootholds = \"anywhere\"\n[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n"
+    );
     let loaded = scenario::load_text("s.toml", &whole, folder, &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
-    build(&loaded.scenario.terrain, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
+    build(&loaded.scenario, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
 /// A PNG file; `palette` and `transparency` are the PLTE and tRNS chunks.

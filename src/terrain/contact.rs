@@ -274,7 +274,7 @@ mod tests {
     fn feet_keep_away_from_edges_above_and_below() {
         let ground = ground(|x, _| if x > 0.01 { 0.15 } else { 0.0 });
         // Below the step by the wall's distance, above it by the foot's.
-        for (x, expected) in [(-0.08, true), (-0.06, false), (0.0, false), (0.04, false), (0.06, true)] {
+        for (x, expected) in [(-0.08, true), (-0.04, false), (0.0, false), (0.04, false), (0.06, true)] {
             assert_eq!(ground.is_steppable([x, 0.0]), expected, "x = {x}");
         }
         assert!(!ground.is_steppable([-0.96, 0.0]) && !ground.is_steppable([3.0, 0.0]));

@@ -29,7 +29,7 @@ pub fn solved(text: &str) -> (Motion, Plan) {
     let loaded = load_text("scenario", text, ".".as_ref(), &[]).expect("a scenario");
     let scenario = &loaded.scenario;
     let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
-    let build = || warp::build(&prepared.surface, &scenario.map, &mut |_| ControlFlow::Continue(()));
+    let build = || warp::build(&prepared.surfaces.posture, &scenario.map, &mut |_| ControlFlow::Continue(()));
     let map = (scenario.formulation != Formulation::Direct).then(|| build().expect("a map").0);
     let task = prepared.task(&loaded, map.as_ref());
     let motion = solve(&task, &mut Patient(scenario)).expect("a motion");
@@ -94,6 +94,7 @@ pub fn standing() -> Plan {
             height: vec![0.0; rows * columns],
             raw: None,
         },
+        patches: Vec::new(),
         map: None,
         history_objective: vec![1.0, 0.5, 0.25],
         history_constraint_violation: vec![1.0, 1e-2, 1e-6],
@@ -117,6 +118,7 @@ pub fn standing() -> Plan {
                     .map(|[x, y]| Box3 { center: [x, y, -0.42], half_size: [0.15, 0.10, 0.10] })
                     .to_vec(),
                 torso: Box3 { center: [0.0; 3], half_size: [0.32, 0.14, 0.10] },
+                foot_radius: 0.03,
             },
             limits: None,
             solver: MetaSolver {

@@ -97,7 +97,7 @@ class Plan:
     foot_names: tuple[str, ...]  # E
     foot_adhesive: Bools  # (E,)
     terrain: Heightfield
-    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster
+    terrain_raw: Heightfield | None  # before smoothing, where the input was a raster and the plan is for the smoothed ground
     robot: PlannedRobot
     pull_limit: float  # largest pull of an adhesive foot, fraction of m g; 0 if no foot is adhesive
     solved: bool  # every constraint of the NLP holds
@@ -289,6 +289,8 @@ def read_plan(path: str | Path) -> Plan:
     if min(heights.shape) < 2 or (spacing <= 0).any():
         raise check.fail("heightfield", "needs two rows, two columns and positive spacing")
     raw = check.floats("heightfield_raw", ("R", "C")) if "heightfield_raw" in check.arrays else None
+    if raw is not None and "patch_corners" in check.arrays:  # planned for the raw ground
+        heights, raw = raw, None
 
     solver = meta.get("solver")
     return Plan(

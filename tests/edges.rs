@@ -1,0 +1,114 @@
+//! Ground with edges: planned on patches, checked against the raw ground; what cannot be walked is refused before the NLP.
+
+use std::ops::ControlFlow;
+
+use crate::common::solved;
+use warpgait::check::check;
+use warpgait::pipeline::Prepared;
+use warpgait::plan::Plan;
+use warpgait::scenario::load_text;
+
+/// A short walk over a formula with edges.
+fn scenario(robot: &str, formulation: &str, expression: &str, goal: f64) -> String {
+    format!(
+        "formulation = \"{formulation}\"\nhorizon = 6.0\n[robot]\nname = \"{robot}\"\n\
+         [terrain]\nkind = \"formula\"\nexpression = \"{expression}\"\nspacing = 0.02\n\
+         extent = [-1.4, 2.4, -1.0, 1.0]\n[start]\nposition = [-0.4, 0.0]\n[goal]\nposition = [{goal}, 0.0]\n\
+         [contact]\nfootholds = \"patches\"\n"
+    )
+}
+
+/// A step up of 12 cm at x = 0.6 m.
+const STEP: &str = "0.06*(1 + sign(x - 0.61))";
+
+fn objections(plan: &Plan) -> Vec<String> {
+    let report = check(plan).expect("a sound plan");
+    report.rows.iter().filter(|row| !row.passed).map(|row| row.name.clone()).collect()
+}
+
+#[test]
+fn steps_and_gaps_are_walked_in_every_formulation() {
+    let gap = "-0.2*(sign(x - 0.61) - sign(x - 0.81))";
+    for formulation in ["warped", "direct", "hybrid"] {
+        for (robot, expression) in [("anymal_towr", STEP), ("anymal_c", STEP), ("anymal_c", gap)] {
+            let (motion, plan) = solved(&scenario(robot, formulation, expression, 1.0));
+            assert!(motion.solved, "{robot}, {formulation}, {expression}: {}", motion.status);
+            assert_eq!(objections(&plan), Vec::<String>::new(), "{robot}, {formulation}, {expression}");
+            assert!(plan.patches.iter().zip(&plan.phase_durations).all(|(p, d)| 2 * p.len() == d.len() + 1));
+        }
+    }
+}
+
+#[test]
+fn a_plan_with_patches_survives_its_file_and_every_lie_about_them_is_noticed() {
+    let (_, plan) = solved(&scenario("anymal_towr", "direct", STEP, 1.0));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("step.plan.npz");
+    plan.write(&path).unwrap();
+    let read = Plan::read(&path).unwrap();
+    assert_eq!(read.patches, plan.patches);
+    assert_eq!(objections(&read), Vec::<String>::new());
+
+    let spoiled = |spoil: &dyn Fn(&mut Plan)| {
+        let mut plan = plan.clone();
+        spoil(&mut plan);
+        objections(&plan)
+    };
+    let shift = |by: [f64; 3]| {
+        spoiled(&move |plan| {
+            for corner in plan.patches.iter_mut().flatten().flatten() {
+                (0..3).for_each(|c| corner[c] += by[c]);
+            }
+        })
+    };
+    let has =
+        |found: Vec<String>, law: &str| assert!(found.iter().any(|name| name == law), "{law}: {found:?}");
+    has(shift([0.0, 0.0, 0.05]), "stance_gap");
+    has(shift([0.5, 0.0, 0.0]), "patch");
+    has(spoiled(&|plan| plan.patches[1].truncate(2)), "patch_count");
+    has(spoiled(&|plan| plan.ground.height.iter_mut().for_each(|h| *h += 0.03)), "patch_roughness");
+    // A wall in the way of the swings, between the footholds.
+    let wall = |plan: &mut Plan| {
+        let ground = &mut plan.ground;
+        for (cell, height) in ground.height.iter_mut().enumerate() {
+            let x = ground.origin[0] + ground.spacing[0] * (cell % ground.columns) as f64;
+            *height += if (0.55..0.62).contains(&x) { 0.3 } else { 0.0 };
+        }
+    };
+    has(spoiled(&wall), "swing_edge");
+    // Without its patches, feet would stand on a spline through the edges.
+    has(spoiled(&|plan| plan.patches.clear()), "normal");
+}
+
+#[test]
+fn ground_that_cannot_be_walked_is_refused_with_the_place() {
+    let wall = "0.3*(1 + sign(x - 0.61))";
+    let gap = "-0.5*(sign(x - 0.41) - sign(x - 1.21))";
+    let needles = "0.5*(sin(40*x)*sin(40*y))";
+    for (expression, words) in [
+        (wall, vec!["foot ", "would have to step from x = ", "0.60 m in height"]),
+        (gap, vec!["foot ", "x = ", "y = "]),
+        (needles, vec!["there is no place where a foot can stand"]),
+    ] {
+        let text = scenario("anymal_c", "hybrid", expression, 1.6);
+        let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+        let message = match Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())) {
+            Ok(_) => panic!("{expression}: not refused"),
+            Err(error) => error.to_string(),
+        };
+        assert!(words.iter().all(|part| message.contains(part)), "{message}");
+    }
+}
+
+#[test]
+fn short_treads_get_more_steps() {
+    let stairs = "0.12*max(0, min(4, floor((x - 0.3)/0.3)))";
+    let steps = |expression: &str| {
+        let text = scenario("anymal_c", "hybrid", expression, 1.8);
+        let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+        let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("stairs");
+        prepared.gait.swings[0].len()
+    };
+    let usual = steps("0*x");
+    assert!(steps(stairs) > usual, "{} and {usual}", steps(stairs));
+}
