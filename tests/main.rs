@@ -9,6 +9,7 @@ mod cli;
 mod common;
 mod derivatives;
 mod durations;
+mod edges;
 mod exact;
 mod motions;
 mod plan;
