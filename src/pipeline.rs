@@ -110,8 +110,7 @@ impl Prepared {
             let _ = observer(&Event::Note(&format!("terrain: {note}")));
         }
         let surfaces = Surfaces::of(scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
-        let gait =
-            planner::choose_gait(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
+        let gait = planner::choose_gait(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
         Ok(Self { gait, ground, surfaces })
     }
 

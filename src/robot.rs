@@ -147,7 +147,12 @@ impl Robot {
 
     /// The largest of a length of the legs; none if it is zero, or no leg is described.
     fn largest(&self, length: impl Fn(&Leg) -> f64) -> Option<f64> {
-        self.feet.iter().filter_map(|foot| foot.leg.as_ref()).map(length).reduce(f64::max).filter(|l| *l > 0.0)
+        self.feet
+            .iter()
+            .filter_map(|foot| foot.leg.as_ref())
+            .map(length)
+            .reduce(f64::max)
+            .filter(|l| *l > 0.0)
     }
 
     fn from_document(document: &Document) -> Result<Self> {

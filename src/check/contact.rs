@@ -130,10 +130,8 @@ fn footholds(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
             let margin = s.scenario.contact.edge_margin;
             for [u, v] in [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
                 let patch = patch_at(s, &stances[e], n, e);
-                let normal = patch.map_or_else(
-                    || s.ground.normal(x + margin * u, y + margin * v),
-                    |patch| patch.normal(),
-                );
+                let normal = patch
+                    .map_or_else(|| s.ground.normal(x + margin * u, y + margin * v), |patch| patch.normal());
                 steep.meet(normal[0].hypot(normal[1]) / normal[2] - most, n, Some(e));
             }
         }

@@ -15,8 +15,8 @@ use crate::heightfield::Heightfield;
 use crate::pipeline::{self, BuiltMap, Event};
 use crate::report::map_table;
 use crate::scenario;
-use crate::warp::{MapReport, WarpMap};
 use crate::terrain::Surfaces;
+use crate::warp::{MapReport, WarpMap};
 use crate::{Error, Result, terrain};
 
 const EXAMPLES: &str = "\

@@ -105,7 +105,8 @@ impl Constraint for SwingClearance {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (r, &at) in self.places.iter().enumerate() {
             let (foot, node) = self.node(state, at);
-            Tangent::foot(model, foot, node).add_along(&self.distance(model, state, at).1, &mut sink.row(first + r));
+            Tangent::foot(model, foot, node)
+                .add_along(&self.distance(model, state, at).1, &mut sink.row(first + r));
         }
     }
 

@@ -15,11 +15,7 @@ pub fn height_form(ground: &HeightJet) -> Matrix3<f64> {
 /// How far a point is above one of the surfaces that bodies clear, with its gradient and Hessian in q: the distance to the tangent
 /// plane of a smooth ground. Over edges, where n_z can be close to zero, it is the height above the surface, which is a path
 /// of a ball and so contains the distance already.
-pub fn clearance(
-    model: &Model,
-    q: &Vector3<f64>,
-    surface: &HeightJet,
-) -> (f64, Vector3<f64>, Matrix3<f64>) {
+pub fn clearance(model: &Model, q: &Vector3<f64>, surface: &HeightJet) -> (f64, Vector3<f64>, Matrix3<f64>) {
     if model.surfaces.have_edges() {
         let by_gap = Vector3::new(-surface.d1[0], -surface.d1[1], 1.0);
         return (q.z - surface.h, by_gap, -height_form(surface));

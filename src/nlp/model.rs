@@ -54,13 +54,7 @@ pub struct Model {
 
 impl Model {
     /// The model of a scenario.
-    pub fn new(
-        scenario: &Scenario,
-        robot: &Robot,
-        gait: &Gait,
-        surfaces: Surfaces,
-        spaces: Spaces,
-    ) -> Self {
+    pub fn new(scenario: &Scenario, robot: &Robot, gait: &Gait, surfaces: Surfaces, spaces: Spaces) -> Self {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
         let adhesive_feet = &scenario.robot.adhesive_feet;
         let inertia = Matrix3::from_fn(|r, c| robot.inertia[r][c]);

@@ -265,7 +265,9 @@ pub(crate) fn swing_points(model: &Model, foot: usize) -> Vec<SwingPoint> {
             let samples = (variables.swing.end - variables.swing.start) as usize;
             let least = if model.surfaces.have_edges() { POINTS_OVER_EDGES } else { 0 };
             let intervals = samples.max(least);
-            (1..intervals).filter(|k| 2 * k != intervals).for_each(|k| add(k as f64 / intervals as f64, false));
+            (1..intervals)
+                .filter(|k| 2 * k != intervals)
+                .for_each(|k| add(k as f64 / intervals as f64, false));
         }
     }
     points

@@ -90,7 +90,6 @@ impl<'a> BasePath<'a> {
         Self { timing, ..self.clone() }
     }
 
-
     /// How long the base travels, s.
     pub fn travel_time(&self) -> f64 {
         (self.travel[1] - self.travel[0]).max(self.model.layout.time_step)

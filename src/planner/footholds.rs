@@ -1,59 +1,17 @@
 //! Chooses a patch for every stance before the motion is optimized, where feet may stand on patches only.
 //!
-//! The base's way is given by its guess; when it is where is not. A foothold is a place on the foot's *track*: for each place s
-//! of the base on its way, the steppable cell that is closest to the foot's nominal place, to the left or right. A beam search
-//! goes through the touch-downs of all feet in order of time and keeps the cheapest partial plans. Each knows the interval of s in
-//! which every standing foot is within reach; it grows with the base's largest speed and shrinks at each touch-down. So a
-//! plan may wait before a gap and hurry afterward. A touch-down costs
-//!
-//! - the squared distance of the foothold from where the base will be in the middle of the stance;
-//! - what is out of the reach box, sideways and in height, at touch-down, and what the interval lacks to have an inside;
-//! - the squared difference of the step from the base's travel, so that steps are regular;
-//! - what the step is longer or higher than the leg can take;
-//! - a little for each direction in which the ground next to the foot cannot be stood on.
-//!
-//! The patch is then the largest rectangle around the cell ([`ContactGround::patch`]), in which the NLP moves the foothold freely.
+//! [`super::foothold_search`] chooses a steppable cell for each. The patch is then the largest rectangle around the cell
+//! ([`ContactGround::patch`]), in which the NLP moves the foothold freely.
 
 use nalgebra::Vector3;
 
-use super::base_path::{BasePath, REACH_MARGIN, middle};
-use super::standing::Pose;
+use super::base_path::BasePath;
+use super::foothold_search::{Place, Search, largest_step};
 use crate::nlp::Model;
-use crate::robot::Robot;
 use crate::scenario::Scenario;
-use crate::terrain::{ContactGround, Patch, Surfaces};
-use crate::trajectory::space::Space;
-use crate::trajectory::{Gait, Spaces};
+use crate::terrain::{ContactGround, Patch};
 use crate::{Error, Result};
 
-/// Lengths of a cycle that are tried, as fractions of the usual one.
-const CYCLES: [f64; 4] = [1.0, 0.9, 0.8, 0.7];
-/// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
-const MORE_STEPS: f64 = 0.1;
-/// Distance of the places on a track, as a fraction of the half length of the reach box.
-const APART: f64 = 0.09;
-/// Footholds further ahead or behind than this many half lengths of the reach box are not tried.
-const WINDOW: f64 = 1.3;
-/// Places on a track beyond each end of the way, at most.
-const MOST_BEYOND: f64 = 100.0;
-/// Partial plans that are kept.
-const BEAM: usize = 300;
-/// Weight of what is beyond a limit, against squared distances.
-const BEYOND: f64 = 20.0;
-/// Weight of irregular steps.
-const REGULAR: f64 = 0.5;
-/// Cost of each direction without room, m².
-const NO_ROOM: f64 = 2e-4;
-/// Weight of the base's difference from steady travel.
-const LATE: f64 = 0.2;
-/// Fraction of that difference that is kept until the middle of a stance.
-const KEPT_LAG: f64 = 0.6;
-/// Largest speed of the base, as a multiple of its mean speed.
-const FASTEST: f64 = 2.0;
-/// Longest step, as a fraction of the length of the reach box, unless the base travels faster.
-const LONGEST: f64 = 0.86;
-/// Highest step up or down, in standing heights.
-const HIGHEST: f64 = 0.58;
 /// What is beyond a limit by more than this, in standing heights, is refused before the NLP.
 const HOPELESS: f64 = 0.3;
 
@@ -80,348 +38,6 @@ pub struct Assignment {
     pub walkable: Result<()>,
 }
 
-/// The gait of a scenario. Over ground with edges, a gait without a given cycle gets more steps where that makes the footholds better,
-/// such as on a staircase with short treads.
-///
-/// # Errors
-/// Those of the gait, and those of [`assign`] if no number of steps will do.
-pub fn choose_gait(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Gait> {
-    let usual = Gait::of(scenario, robot)?;
-    let Some(contact) = &surfaces.contact else { return Ok(usual) };
-    // The map is not needed to count steps.
-    let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
-    let assess = |gait: &Gait| {
-        let model = Model::new(scenario, robot, gait, surfaces.clone(), spaces.clone());
-        let found = assign(scenario, &model, contact)?;
-        found.walkable.map(|()| found.cost / gait.swings.iter().map(Vec::len).sum::<usize>().max(1) as f64)
-    };
-    let mut first_error = None;
-    let mut best: Option<(f64, Gait)> = None;
-    for (n, factor) in CYCLES.into_iter().enumerate() {
-        let gait = if n == 0 { usual.clone() } else {
-            let Some(Ok(gait)) = Gait::with_more_steps(scenario, robot, factor) else { break };
-            gait
-        };
-        let found = assess(&gait);
-        if std::env::var("WG_SAY").is_ok() { eprintln!("factor {factor}: {:?} steps {}", found.as_ref().map_err(|e| e.to_string()), gait.swings[0].len()); }
-        match found {
-            Ok(cost) => {
-                let cost = cost + MORE_STEPS * (1.0 - factor);
-                if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                    best = Some((cost, gait));
-                }
-            }
-            Err(error) => { first_error.get_or_insert(error); }
-        }
-    }
-    match (best, first_error) {
-        (Some((_, gait)), _) => Ok(gait),
-        (None, Some(error)) => Err(error),
-        (None, None) => Ok(usual),
-    }
-}
-
-/// Where a foot can stand.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    /// Of the base on its way when the foot is at its nominal place ahead or behind, m.
-    s: f64,
-    cell: usize,
-    point: Vector3<f64>,
-    /// Squared distance to the left or right, and room.
-    cost: f64,
-}
-
-/// A partial plan.
-#[derive(Clone, Debug)]
-struct Partial {
-    cost: f64,
-    /// Where the base can be, m.
-    interval: [f64; 2],
-    /// By foot, where it is or was last.
-    places: Vec<Place>,
-    /// The last of its touch-downs.
-    last: Option<usize>,
-}
-
-/// A touch-down in the history of a partial plan.
-struct Touchdown {
-    before: Option<usize>,
-    foot: usize,
-    place: Place,
-    note: String,
-}
-
-/// A switch of a foot.
-#[derive(Clone, Copy, Debug)]
-struct Switch {
-    /// In samples.
-    time: f64,
-    foot: usize,
-    /// The stance that begins; none at lift-off.
-    begins: Option<usize>,
-}
-
-struct Search<'a> {
-    model: &'a Model,
-    contact: &'a ContactGround,
-    path: &'a BasePath<'a>,
-    /// Poses along the way, `apart` m from each other, from s = `first` on.
-    way: Vec<Pose>,
-    first: f64,
-    apart: f64,
-    /// By foot, for each pose of the way.
-    tracks: Vec<Vec<Option<Place>>>,
-    history: Vec<Touchdown>,
-}
-
-impl<'a> Search<'a> {
-    fn new(model: &'a Model, contact: &'a ContactGround, path: &'a BasePath<'a>) -> Self {
-        let half = model.reach.iter().map(|r| r.half_size[0]).fold(f64::INFINITY, f64::min);
-        let length = path.length;
-        let count = (length / (APART * half)).ceil().max(1.0);
-        let apart = length / count;
-        // Feet can be ahead of and behind the ends of the way by as much as they reach.
-        let beyond = (WINDOW * half / apart).ceil().min(MOST_BEYOND);
-        let numbers = 0..=(count + 2.0 * beyond) as usize;
-        let way = numbers.map(|n| path.pose_on_way((n as f64 - beyond) / count)).collect();
-        let first = -beyond * apart;
-        let mut search = Self { model, contact, path, way, first, apart, tracks: vec![], history: vec![] };
-        search.tracks = (0..model.feet())
-            .map(|foot| (0..search.way.len()).map(|n| search.place(foot, n)).collect())
-            .collect();
-        search
-    }
-
-    /// The best cell for a foot when the base is at pose n of the way: closest to the nominal place sideways.
-    fn place(&self, foot: usize, n: usize) -> Option<Place> {
-        let s = self.first + n as f64 * self.apart;
-        let (pose, reach) = (&self.way[n], &self.model.reach[foot]);
-        let nominal = pose.position + pose.rotation * self.model.nominal[foot];
-        let side = self.path.sideways();
-        let spacing = self.contact.grid().spacing[0].min(self.contact.grid().spacing[1]);
-        let steps = (WINDOW * reach.half_size[1] / spacing) as i64;
-        (-steps..=steps)
-            .filter_map(|k| {
-                let aside = k as f64 * spacing;
-                let cell = self.contact.steppable_cell([nominal.x + aside * side[0], nominal.y + aside * side[1]])?;
-                let no_room = f64::from(self.contact.closed_directions(cell));
-                let point = Vector3::from(self.contact.point(cell));
-                Some(Place { s, cell, point, cost: aside * aside + NO_ROOM * no_room })
-            })
-            .min_by(|a, b| a.cost.total_cmp(&b.cost))
-    }
-
-    /// `[foot][stance]`, and the cost.
-    fn run(mut self) -> Result<(Vec<Vec<Place>>, f64)> {
-        let start = self.at_rest()?;
-        if std::env::var("WG_SAY").is_ok() { for p in self.tracks[0].iter().flatten() { eprintln!("track {:.3} {:.3?} {:.4}", p.s, p.point.as_slice(), p.cost); } }
-        let mut beam = vec![start.clone()];
-        let mut standing = vec![true; self.model.feet()];
-        let mut now = 0.0;
-        for switch in self.switches() {
-            let elapsed = (switch.time - now) * self.model.layout.time_step;
-            beam.iter_mut().for_each(|partial| self.travel(partial, &standing, elapsed));
-            now = switch.time;
-            if let Some(stance) = switch.begins {
-                beam = self.touch_down(&beam, switch, stance)?;
-            }
-            standing[switch.foot] = switch.begins.is_some();
-        }
-        let length = self.path.length;
-        let end = |partial: &Partial| {
-            partial.cost + BEYOND * distance(partial.interval, length).powi(2)
-        };
-        let best = beam.iter().min_by(|a, b| end(a).total_cmp(&end(b)));
-        if std::env::var("WG_SAY").is_ok() {
-            if let Some(b) = best {
-                eprintln!("cost {:.3} {:.3?}", b.cost, b.interval);
-                let mut at = b.last.map(|n| &self.history[n]);
-                while let Some(t) = at {
-                    eprintln!("foot {} s {:.3} point {:.3?} {}", t.foot, t.place.s, t.place.point.as_slice(), t.note);
-                    at = t.before.map(|n| &self.history[n]);
-                }
-            }
-        }
-        Ok((self.footholds(&start, best.and_then(|best| best.last)), best.map_or(0.0, end)))
-    }
-
-    /// All feet at the start.
-    fn at_rest(&self) -> Result<Partial> {
-        let mut places = Vec::new();
-        for foot in 0..self.model.feet() {
-            let from = self.places_around(foot, 0.0).into_iter().min_by(|a, b| {
-                let cost = |p: &Place| p.cost + p.s * p.s;
-                cost(a).total_cmp(&cost(b))
-            });
-            places.push(from.ok_or_else(|| self.nothing_to_stand_on(foot, 0.0, 0.0))?);
-        }
-        Ok(Partial { cost: 0.0, interval: [0.0, 0.0], places, last: None })
-    }
-
-    /// Touch-downs and lift-offs in order; at the same time, feet touch down first.
-    fn switches(&self) -> Vec<Switch> {
-        let mut switches = Vec::new();
-        for (foot, variables) in self.model.layout.feet.iter().enumerate() {
-            for (j, swing) in variables.swings.iter().enumerate() {
-                switches.push(Switch { time: swing.swing.start, foot, begins: None });
-                switches.push(Switch { time: swing.swing.end, foot, begins: Some(j + 1) });
-            }
-        }
-        switches.sort_by(|a, b| a.time.total_cmp(&b.time).then(b.begins.is_some().cmp(&a.begins.is_some())));
-        switches
-    }
-
-    /// Lets the base travel for some time, s, while some feet stand.
-    fn travel(&self, partial: &mut Partial, standing: &[bool], elapsed: f64) {
-        let [least, most] = partial.interval;
-        let mut interval = [least, (most + self.fastest() * elapsed).min(self.path.length)];
-        for (foot, place) in partial.places.iter().enumerate().filter(|(foot, _)| standing[*foot]) {
-            partial.cost += BEYOND * narrow(&mut interval, self.within_reach(foot, place)).powi(2);
-        }
-        partial.interval = interval;
-    }
-
-    /// Where the base can be while a foot is at a place.
-    fn within_reach(&self, foot: usize, place: &Place) -> [f64; 2] {
-        let reach = &self.model.reach[foot];
-        let half = (1.0 - REACH_MARGIN) * reach.half_size[0];
-        let ahead = self.model.nominal[foot].x - reach.center[0];
-        [place.s + ahead - half, place.s + ahead + half]
-    }
-
-    fn fastest(&self) -> f64 {
-        FASTEST * self.path.length / self.path.travel_time()
-    }
-
-    /// Extends all partial plans by all footholds, and keeps the best.
-    fn touch_down(&mut self, beam: &[Partial], switch: Switch, stance: usize) -> Result<Vec<Partial>> {
-        let foot = switch.foot;
-        let layout = &self.model.layout;
-        let last = layout.intervals as f64;
-        let steady = |k: f64| self.path.steady(k * layout.time_step);
-        let [before, this] = [stance - 1, stance].map(|j| &layout.feet[foot].stances[j].stance);
-        let [begin, mid] = [this.start, middle(this, last)].map(steady);
-        let travel = mid - steady(middle(before, last));
-        let stays = this.end == last;
-        let mut found: Vec<(f64, usize, Place, [f64; 2])> = Vec::new();
-        let mut nearest = None;
-        for (n, partial) in beam.iter().enumerate() {
-            let at = begin.clamp(partial.interval[0], partial.interval[1]);
-            let wanted = (mid + KEPT_LAG * (at - begin)).min(self.path.length);
-            let late = LATE * (at - begin).powi(2);
-            nearest.get_or_insert(wanted);
-            for place in self.places_around(foot, wanted) {
-                let mut interval = partial.interval;
-                let within_reach = self.within_reach(foot, &place);
-                let mut lacking = narrow(&mut interval, within_reach);
-                if stays {
-                    lacking += distance(within_reach, self.path.length);
-                }
-                let base = begin.clamp(interval[0], interval[1]);
-                let cost = partial.cost
-                    + late
-                    + place.cost
-                    + (place.s - wanted).powi(2)
-                    + BEYOND * (lacking.powi(2) + self.out_of_reach(foot, &place, base).powi(2))
-                    + BEYOND * self.out_of_reach(foot, &place, 2.0 * place.s - base).powi(2)
-                    + self.step_cost(&partial.places[foot], &place, foot, travel);
-                found.push((cost, n, place, interval));
-            }
-        }
-        if found.is_empty() {
-            return Err(self.nothing_to_stand_on(foot, nearest.unwrap_or(begin), switch.time));
-        }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut seen = std::collections::HashSet::new();
-        let mut extended = Vec::with_capacity(BEAM);
-        for (cost, n, place, interval) in found {
-            let mut places = beam[n].places.clone();
-            places[foot] = place;
-            // Of plans whose feet are at the same places, the cheapest.
-            if !seen.insert(places.iter().map(|p| p.cell).collect::<Vec<_>>()) {
-                continue;
-            }
-            self.history.push(Touchdown { before: beam[n].last, foot, place, note: format!("t {:.2} interval {:.2?} begin {:.2} mid {:.2} cost {:.3} of {:.3}", switch.time*0.05, interval, begin, mid, cost - beam[n].cost, cost) });
-            extended.push(Partial { cost, interval, places, last: Some(self.history.len() - 1) });
-            if extended.len() == BEAM {
-                break;
-            }
-        }
-        Ok(extended)
-    }
-
-    /// The places of a foot's track around s.
-    fn places_around(&self, foot: usize, s: f64) -> Vec<Place> {
-        let window = WINDOW * self.model.reach[foot].half_size[0];
-        self.tracks[foot].iter().flatten().filter(|place| (place.s - s).abs() <= window).copied().collect()
-    }
-
-    /// How far a foothold is out of the reach box sideways and in height, with the base at s, m.
-    fn out_of_reach(&self, foot: usize, place: &Place, s: f64) -> f64 {
-        let reach = &self.model.reach[foot];
-        let pose = &self.way[self.number(s)];
-        let local = pose.rotation.tr_mul(&(place.point - pose.position));
-        let beyond = |d: usize| {
-            ((local[d] - reach.center[d]).abs() - (1.0 - REACH_MARGIN) * reach.half_size[d]).max(0.0)
-        };
-        beyond(1).hypot(beyond(2))
-    }
-
-    /// The pose of the way that is nearest to s.
-    fn number(&self, s: f64) -> usize {
-        let n = ((s - self.first) / self.apart).round().max(0.0) as usize;
-        n.min(self.way.len() - 1)
-    }
-
-    fn step_cost(&self, from: &Place, to: &Place, foot: usize, travel: f64) -> f64 {
-        let (irregular, excess) = (to.s - from.s - travel, self.excess(foot, from, to));
-        REGULAR * irregular * irregular + BEYOND * excess * excess
-    }
-
-    /// What a step is longer and higher than the leg can take, m.
-    fn excess(&self, foot: usize, from: &Place, to: &Place) -> f64 {
-        let step = to.point - from.point;
-        let [longest, highest] = largest_step(self.model, self.path, foot);
-        (step.norm() - longest).max(0.0) + (step.z.abs() - highest).max(0.0)
-    }
-
-    /// `[foot][stance]` of a whole plan, from its last touch-down back to the start.
-    fn footholds(&self, start: &Partial, last: Option<usize>) -> Vec<Vec<Place>> {
-        let mut footholds = vec![Vec::new(); self.model.feet()];
-        let mut at = last.map(|n| &self.history[n]);
-        while let Some(touchdown) = at {
-            footholds[touchdown.foot].push(touchdown.place);
-            at = touchdown.before.map(|n| &self.history[n]);
-        }
-        for (places, first) in footholds.iter_mut().zip(&start.places) {
-            places.push(*first);
-            places.reverse();
-        }
-        footholds
-    }
-
-    fn nothing_to_stand_on(&self, foot: usize, s: f64, sample: f64) -> Error {
-        let pose = &self.way[self.number(s)];
-        let place = pose.position + pose.rotation * self.model.nominal[foot];
-        let reach = WINDOW * self.model.reach[foot].half_size[0];
-        Error::input(format!(
-            "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: the ground there is a gap, too rough or too steep; choose another way (start, goal)",
-            self.model.foot_names[foot],
-            place.x,
-            place.y,
-            sample * self.model.layout.time_step
-        ))
-    }
-}
-
-/// The longest and the highest step of a foot, m.
-fn largest_step(model: &Model, path: &BasePath, foot: usize) -> [f64; 2] {
-    let travel = path.length / path.travel_time() * model.layout.longest_cycle(foot);
-    let longest = (LONGEST * 2.0 * model.reach[foot].half_size[0]).max(travel);
-    [longest, HIGHEST * -model.nominal[foot].z]
-}
-
 /// Refuses steps and footholds that no motion of the base makes possible; `path` is timed for them.
 fn ensure_walkable(model: &Model, path: &BasePath, chosen: &[Vec<Place>]) -> Result<()> {
     let layout = &model.layout;
@@ -441,7 +57,11 @@ fn ensure_walkable(model: &Model, path: &BasePath, chosen: &[Vec<Place>]) -> Res
             };
             return Err(Error::input(format!(
                 "foot {name} would have to step from x = {:.2}, y = {:.2} to x = {:.2}, y = {:.2} m at {:.1} s, {what}; choose another way (start, goal) or another gait",
-                a.x, a.y, b.x, b.y, layout.feet[foot].stances[j].stance.end * layout.time_step
+                a.x,
+                a.y,
+                b.x,
+                b.y,
+                layout.feet[foot].stances[j].stance.end * layout.time_step
             )));
         }
         let reach = &model.reach[foot];
@@ -454,27 +74,13 @@ fn ensure_walkable(model: &Model, path: &BasePath, chosen: &[Vec<Place>]) -> Res
                 if beyond > hopeless {
                     return Err(Error::input(format!(
                         "foot {name} finds nothing to stand on in its reach at {:.1} s: the best place, x = {:.2}, y = {:.2} m, is {beyond:.2} m too far; choose another way (start, goal) or another gait",
-                        k * layout.time_step, place.point.x, place.point.y
+                        k * layout.time_step,
+                        place.point.x,
+                        place.point.y
                     )));
                 }
             }
         }
     }
     Ok(())
-}
-
-/// How far a value is outside an interval.
-fn distance([least, most]: [f64; 2], value: f64) -> f64 {
-    (least - value).max(value - most).max(0.0)
-}
-
-/// Intersects an interval with another. If nothing is left, it becomes the middle between the two; returns what was lacking, m.
-fn narrow(interval: &mut [f64; 2], other: [f64; 2]) -> f64 {
-    let (least, most) = (interval[0].max(other[0]), interval[1].min(other[1]));
-    if least <= most {
-        *interval = [least, most];
-        return 0.0;
-    }
-    *interval = [0.5 * (least + most); 2];
-    least - most
 }

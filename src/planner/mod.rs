@@ -5,6 +5,8 @@
 //! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
 //! | `base_path` | where the base is guessed to be at each time |
 //! | `footholds` | which patch each stance gets, where feet may stand on patches only |
+//! | `foothold_search` | the search for them |
+//! | `step_count` | how many steps a motion takes over edges |
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
@@ -18,6 +20,7 @@
 
 mod base_path;
 pub mod derivatives;
+mod foothold_search;
 mod footholds;
 pub mod guess;
 pub mod motion;
@@ -27,12 +30,13 @@ mod retiming;
 pub mod solve;
 pub mod stage;
 mod standing;
+mod step_count;
 mod stopping;
 mod threads;
 pub mod violation;
 
-pub use footholds::choose_gait;
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
 pub use solve::{Host, Progress, Task, solve};
 pub use stage::Stage;
+pub use step_count::choose_gait;

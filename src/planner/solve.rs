@@ -90,8 +90,9 @@ pub trait Host {
     fn build_map(&mut self, ground: &Heightfield) -> Result<Option<WarpMap>>;
 }
 
-/// Plans a motion: the plain solve first; if it finds no feasible point and the scenario allows it, a continuation, in which
-/// the terrain grows out of the plane in steps, each solved from the one before.
+/// Plans a motion: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
+/// the terrain grows out of the plane in steps, each solved from the one before; over ground with edges, a second solve that leaves
+/// the joints to the end.
 ///
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
@@ -104,12 +105,17 @@ pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
         Continuation::Steps(n) => n,
     };
-    let fraction = if steps == 0 { 1.0 } else { PLAIN_FRACTION };
+    let over_edges = task.surfaces.have_edges();
+    let fraction = if steps == 0 && !over_edges { 1.0 } else { PLAIN_FRACTION };
     let budget = (solver.max_iterations as f64 * fraction) as usize;
     let mut solve = Solve::new(task, host);
-    let mut end = solve.plain(budget)?;
-    if !end.feasible && !end.interrupted && steps > 0 {
-        end = solve.continuation(steps, end)?;
+    let mut end = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
+    if !end.feasible && !end.interrupted {
+        if over_edges {
+            end = solve.joints_last(solver.max_iterations)?;
+        } else if steps > 0 {
+            end = solve.continuation(steps, end)?;
+        }
     }
     Ok(solve.finish(end))
 }
@@ -163,18 +169,29 @@ impl<'a> Solve<'a> {
         Ok(x)
     }
 
-    /// Solves from the guess with at most `budget` iterations.
+    /// Solves from the guess, until there are `budget` iterations in all.
+    ///
+    /// Over ground with edges the guess is good, because the footholds and the timing of the base were chosen; a feasible point
+    /// without joints and costs would be a worse start (docs/results.md).
+    fn at_once(&mut self, budget: usize) -> Result<StageEnd> {
+        let model = self.task.model()?;
+        let x = self.guess(&model)?;
+        self.stage(Stage::Whole, model, x, Start::Guess, self.task.scenario.solver.effort, budget)
+    }
+
+    /// Solves from the guess, until there are `budget` iterations in all.
     ///
     /// Where legs are described, the first stage finds a feasible point without their joints, whose speeds and torques are
     /// arbitrary at the guess. Out of the pit this takes a third of the iterations of solving everything at once, and converges
     /// where that does not (docs/results.md).
-    fn plain(&mut self, budget: usize) -> Result<StageEnd> {
+    fn joints_last(&mut self, budget: usize) -> Result<StageEnd> {
         let model = self.task.model()?;
         let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
         if model.legs.iter().any(Option::is_some) {
             let mut rough = model.clone();
             rough.legs.fill(None);
-            let rough = self.stage(Stage::WithoutJoints, rough, x, start, Effort::Feasible, budget)?;
+            let left = budget.saturating_sub(self.iterations);
+            let rough = self.stage(Stage::WithoutJoints, rough, x, start, Effort::Feasible, left)?;
             if !rough.feasible || rough.interrupted {
                 return Ok(rough);
             }

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::gait::GaitSpec;
 use super::map::MapSpec;
-use super::motion::{ContactSpec, DiscretizationSpec, Footholds, GoalSpec, MotionSpec, PhysicsSpec, StartSpec};
+use super::motion::{
+    ContactSpec, DiscretizationSpec, Footholds, GoalSpec, MotionSpec, PhysicsSpec, StartSpec,
+};
 use super::solver::SolverSpec;
 use super::terrain::TerrainSpec;
 use crate::input;

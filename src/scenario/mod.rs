@@ -20,7 +20,9 @@ pub use format::{Formulation, Scenario, json_schema};
 pub use gait::{GaitKind, GaitSpec};
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
-pub use motion::{Cone, ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Law, MotionSpec, PhysicsSpec, StartSpec};
+pub use motion::{
+    Cone, ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Law, MotionSpec, PhysicsSpec, StartSpec,
+};
 pub use solver::{Continuation, ContinuationMode, Effort, Hessian, SolverSpec};
 pub use template::template;
 pub use terrain::TerrainSpec;

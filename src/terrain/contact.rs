@@ -65,7 +65,9 @@ impl ContactGround {
         };
         rule_out(&under_foot(grid, needs.even), &|above| above.abs() <= needs.roughness);
         rule_out(&disc(grid, needs.beside), &|above| above <= RISE_BESIDE * needs.roughness);
-        for ((steppable, height), filled) in steppable.iter_mut().zip(heights).zip(closed(grid, heights, needs.gap)) {
+        for ((steppable, height), filled) in
+            steppable.iter_mut().zip(heights).zip(closed(grid, heights, needs.gap))
+        {
             *steppable &= filled - height <= needs.depth;
         }
         // What lies beyond the border is not known.
@@ -189,7 +191,8 @@ impl ContactGround {
             let [x, y] = std::array::from_fn(|c| {
                 patch.center[c] + step * (u as f64 * axes[0][c] + v as f64 * axes[1][c])
             });
-            self.cells_around([x, y]).is_some_and(|mut cells| cells.all(|cell| self.fits(cell, &patch, &under_foot)))
+            self.cells_around([x, y])
+                .is_some_and(|mut cells| cells.all(|cell| self.fits(cell, &patch, &under_foot)))
         };
         let (mut u, mut v) = ([0_isize; 2], [0_isize; 2]);
         loop {
@@ -253,8 +256,15 @@ mod tests {
     use super::*;
 
     const GRID: Grid = Grid { origin: [-1.0, -1.0], spacing: [0.02, 0.02], columns: 101, rows: 101 };
-    const NEEDS: FootNeeds =
-        FootNeeds { even: 0.033, roughness: 0.012, beside: 0.075, depth: 0.15, gap: 0.45, slope: 0.6, patch: 0.16 };
+    const NEEDS: FootNeeds = FootNeeds {
+        even: 0.033,
+        roughness: 0.012,
+        beside: 0.075,
+        depth: 0.15,
+        gap: 0.45,
+        slope: 0.6,
+        patch: 0.16,
+    };
 
     fn ground(h: impl Fn(f64, f64) -> f64) -> ContactGround {
         ContactGround::new(&GRID, &GRID.sample(|x, y| Ok(h(x, y))).expect("heights"), NEEDS)

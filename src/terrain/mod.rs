@@ -24,8 +24,8 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::scenario::{Scenario, TerrainSpec};
-use formula::Formula;
 pub use contact::{ContactGround, FootNeeds};
+use formula::Formula;
 pub use ground::{Ground, GroundReport};
 pub use patch::Patch;
 pub use surfaces::Surfaces;
@@ -50,7 +50,9 @@ pub fn build(scenario: &Scenario, base_dir: &Path) -> Result<Ground> {
             let formula = Formula::parse(&spec.expression)?;
             function::ground(kind, &spec.domain, |x, y| formula.height(x, y))
         }
-        TerrainSpec::Heightmap(heightmap) => heightmap::ground(kind, heightmap, scenario.footholds(), base_dir),
+        TerrainSpec::Heightmap(heightmap) => {
+            heightmap::ground(kind, heightmap, scenario.footholds(), base_dir)
+        }
     }
 }
 

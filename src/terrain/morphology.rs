@@ -44,11 +44,7 @@ impl Iterator for Neighbors<'_> {
 }
 
 /// Visits every cell with its neighbors at some offsets.
-pub fn for_each_neighborhood(
-    grid: &Grid,
-    offsets: &[Offset],
-    mut visit: impl FnMut(usize, Neighbors),
-) {
+pub fn for_each_neighborhood(grid: &Grid, offsets: &[Offset], mut visit: impl FnMut(usize, Neighbors)) {
     for cell in 0..grid.len() {
         let (column, row) = ((cell % grid.columns) as isize, (cell / grid.columns) as isize);
         visit(cell, Neighbors { grid, offsets: offsets.iter().enumerate(), column, row });
@@ -136,7 +132,9 @@ mod tests {
 
     #[test]
     fn narrow_gaps_are_filled_and_steps_stay() {
-        let gap = |width: f64| closed(&GRID, &raster(|x, _| if (x - 0.3).abs() < 0.5 * width { -0.4 } else { 0.0 }), 0.1);
+        let gap = |width: f64| {
+            closed(&GRID, &raster(|x, _| if (x - 0.3).abs() < 0.5 * width { -0.4 } else { 0.0 }), 0.1)
+        };
         assert!(gap(0.08).iter().all(|h| *h == 0.0));
         assert!(gap(0.15).iter().any(|h| *h < -0.3));
         let step = raster(|x, _| if x > 0.3 { 0.2 } else { 0.0 });

@@ -127,7 +127,8 @@ fn posture(contact: &ContactGround, heights: &[f64], deviation: f64) -> Result<V
     let mut holes = vec![false; heights.len()];
     for_each_neighborhood(grid, &around, |cell, neighbors| {
         let steppable = neighbors.filter(|&(_, i)| contact.steppable()[i]).count();
-        holes[cell] = !contact.steppable()[cell] || (steppable as f64) < LEAST_STEPPABLE * around.len() as f64;
+        holes[cell] =
+            !contact.steppable()[cell] || (steppable as f64) < LEAST_STEPPABLE * around.len() as f64;
     });
     for (height, hole) in filled.iter_mut().zip(&holes) {
         if *hole {
