@@ -13,6 +13,7 @@ mod edges;
 mod exact;
 mod motions;
 mod plan;
+mod sheet;
 mod terrain;
 mod terrain_bad_input;
 mod warp_build;

@@ -7,14 +7,15 @@ edges, and gravel. The scan has 3 mm of sensor noise, and no data (alpha 0) in t
 scanner at the left and in a few stray pixels. The first and the last 0.8 m are flat except for the noise. The file is the
 same every time.
 
-    python3 scenarios/data/make_rubble.py            # writes rubble.png beside this script
+    python3 scenarios/data/make_rubble.py [FOLDER]   # writes rubble.png beside this script, or into FOLDER
 """
 
 import math
 import random
-import struct
-import zlib
+import sys
 from pathlib import Path
+
+from png16 import WHITE, write_png
 
 SPACING = 0.035  # m per pixel
 COLUMNS, ROWS = 172, 115  # x, y
@@ -32,7 +33,6 @@ SCANNER = (-3.6, 0.0, 2.6)  # m, x, y and z of the scanner above the low ground
 SHADOW = 1.2  # m, longer than any shadow
 OCCLUSION = 0.005  # m: ground that rises above the line of sight by more hides a pixel
 LOST = 0.004  # fraction of stray pixels without data
-WHITE = 65535  # largest 16-bit value
 
 
 def curb(x: float, y: float) -> float:
@@ -119,20 +119,8 @@ def is_hidden(heights: list[list[float]], column: int, row: int) -> bool:
     return False
 
 
-def write_png(path: Path, gray_alpha: list[list[tuple[int, int]]]) -> None:
-    """A 16-bit gray + alpha PNG without filters."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    lines = b"".join(b"\0" + b"".join(struct.pack(">HH", g, a) for g, a in line) for line in gray_alpha)
-    header = struct.pack(">IIBBBBB", len(gray_alpha[0]), len(gray_alpha), 16, 4, 0, 0, 0)
-    body = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines, 9)) + chunk(b"IEND", b"")
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + body)
-
-
-def main() -> None:
-    """Write rubble.png beside this script."""
+def main(folder: Path) -> None:
+    """Write rubble.png."""
     rng = random.Random(2022)
     blocks = make_blocks(rng)
     bumps = gravel(rng)
@@ -156,11 +144,11 @@ def main() -> None:
             gray = round(WHITE * min(1.0, max(0.0, measured / FULL_SCALE)))
             line.append((0, 0) if lost else (gray, WHITE))
         pixels.append(line)
-    path = Path(__file__).with_name("rubble.png")
+    path = folder / "rubble.png"
     write_png(path, pixels)
     lost = sum(alpha == 0 for line in pixels for _, alpha in line)
     print(f"{path.name}: {COLUMNS} x {ROWS}, {len(blocks)} blocks, {lost} pixels without data")
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)

@@ -75,7 +75,8 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
     planned.plan.write(&output)?;
     if let Some(plot) = &plot {
-        write_atomically(plot, report::sheet(&planned.plan).as_bytes())?;
+        let drawing = report::sheet(&planned.plan, &planned.prepared.surfaces);
+        write_atomically(plot, drawing.as_bytes())?;
     }
     drop(progress);
 

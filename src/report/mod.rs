@@ -2,6 +2,7 @@
 
 pub(crate) mod axes;
 pub(crate) mod color;
+mod ground;
 mod residuals;
 mod sheet;
 pub(crate) mod svg;

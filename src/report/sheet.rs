@@ -1,21 +1,13 @@
 //! One page that shows a plan: from above, from the side, contacts, forces, convergence.
 
 use super::axes::{Axes, range};
-use super::color::{foot_color, ramp};
+use super::color::foot_color;
+use super::ground::DrawnGround;
 use super::svg::{Font, Svg};
 use super::table::{check_counts, number};
-use crate::plan::{GroundGrid, Plan};
+use crate::plan::Plan;
+use crate::terrain::Surfaces;
 
-/// Bands of height, each of one color.
-const BANDS: usize = 14;
-/// Rows and columns of the shaded ground.
-const RASTER: usize = 150;
-/// The height scale spans at least this, so that flat ground shows no noise, m.
-const MIN_HEIGHT_RANGE: f64 = 0.1;
-/// Overlap of neighboring rectangles, which hides the seams between them, pixels.
-const OVERLAP: f64 = 0.4;
-/// Segments of the ground's profile.
-const PROFILE: u32 = 240;
 /// A motion shorter than this has no direction to be viewed along, m.
 const MIN_LENGTH: f64 = 0.05;
 /// Histories up to this length are drawn with a dot for each iteration.
@@ -24,13 +16,19 @@ const MAX_DOTS: usize = 60;
 const MAX_NAMES: usize = 3;
 /// Style of the base's path.
 const BASE: &str = "stroke=\"#111\" stroke-width=\"2.4\"";
+/// Style of the surface that feet in the air clear.
+const CLEARED: &str = "stroke=\"#555\" stroke-width=\"1.1\" stroke-dasharray=\"4 3\"";
+/// Height of the legends, pixels from the top.
+const LEGEND: f64 = 80.0;
 
-/// An SVG drawing of a plan.
-pub fn sheet(plan: &Plan) -> String {
+/// An SVG drawing of a plan and of the surfaces that it was made with.
+pub fn sheet(plan: &Plan, surfaces: &Surfaces) -> String {
     let mut svg = Svg::new(1280.0, 1010.0);
+    let ground = DrawnGround { grid: &plan.ground, surfaces };
     heading(&mut svg, plan);
-    from_above(&mut svg, plan, [70.0, 110.0, 540.0, 480.0]);
-    from_the_side(&mut svg, plan, [700.0, 110.0, 550.0, 260.0]);
+    from_above(&mut svg, plan, &ground, [70.0, 110.0, 540.0, 480.0]);
+    from_the_side(&mut svg, plan, &ground, [700.0, 110.0, 550.0, 260.0]);
+    legend(&mut svg, plan, surfaces.have_edges());
     contacts(&mut svg, plan, [700.0, 450.0, 550.0, 140.0]);
     normal_forces(&mut svg, plan, [70.0, 680.0, 720.0, 270.0]);
     convergence(&mut svg, plan, [880.0, 680.0, 370.0, 270.0]);
@@ -61,31 +59,59 @@ fn heading(svg: &mut Svg, plan: &Plan) {
     );
     let color = if solver.success && failed.is_empty() { "#1b6e44" } else { "#b3261e" };
     svg.text([70.0, 56.0], &text, Font { size: 13.5, anchor: "start", bold: false, color });
-    // One legend for all panels.
+}
+
+/// Names and samples of what is drawn, left for the view from above and right for all panels.
+fn legend(svg: &mut Svg, plan: &Plan, edges: bool) {
+    let name =
+        |svg: &mut Svg, x: f64, name: &str| svg.text([x + 30.0, LEGEND], name, Font::TICK.anchored("start"));
+    let line = |svg: &mut Svg, x: f64, style: &str, what: &str| {
+        svg.line([x, LEGEND - 4.0], [x + 24.0, LEGEND - 4.0], style);
+        name(svg, x, what);
+    };
     let mut x = 700.0;
-    svg.line([x, 76.0], [x + 24.0, 76.0], BASE);
-    svg.text([x + 30.0, 80.0], "base", Font::TICK.anchored("start"));
-    for (e, name) in plan.foot_names.iter().enumerate() {
-        x += 82.0;
-        svg.line([x, 76.0], [x + 24.0, 76.0], &stroke(e, 2.4));
-        svg.text([x + 30.0, 80.0], name, Font::TICK.anchored("start"));
+    line(svg, x, BASE, "base");
+    for (e, foot) in plan.foot_names.iter().enumerate() {
+        x += 74.0;
+        line(svg, x, &stroke(e, 2.4), foot);
     }
+    if edges {
+        line(svg, x + 74.0, CLEARED, "cleared by swinging feet");
+    }
+    let box_at = |x: f64| [x + 4.0, LEGEND - 11.0, 20.0, 13.0];
+    x = 70.0;
+    svg.circle([x + 14.0, LEGEND - 4.0], 4.0, "fill=\"#555\" stroke=\"#fff\" stroke-width=\"0.8\"");
+    name(svg, x, "foothold");
+    if edges {
+        x += 100.0;
+        svg.rect(box_at(x), &patch_style("#555"));
+        name(svg, x, "patch around it");
+        x += 140.0;
+        DrawnGround::closed_sample(svg, box_at(x));
+        name(svg, x, "no foot can stand here");
+    }
+}
+
+/// The part of a plane within which a foothold lies.
+fn patch_style(color: &str) -> String {
+    format!("fill=\"#fff\" fill-opacity=\"0.3\" stroke=\"{color}\" stroke-width=\"1.3\"")
 }
 
 fn stroke(foot: usize, width: f64) -> String {
     format!("stroke=\"{}\" stroke-width=\"{width}\"", foot_color(foot))
 }
 
-fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+fn from_above(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4]) {
     let visited = |axis: usize| plan.base_position.iter().chain(&plan.foot_position).map(move |p| p[axis]);
     let axes = Axes::equal(frame, range(visited(0), 0.12), range(visited(1), 0.12));
-    let heights = raster(&axes, &plan.ground);
-    svg.clipped(frame, |svg| {
-        svg.rect(frame, "fill=\"#f4f4f4\"");
-        shading(svg, frame, &heights);
-    });
+    ground.draw(svg, &axes);
     axes.draw(svg, "From above, ground shaded by height", "x, m", "y, m");
     svg.clipped(frame, |svg| {
+        for (e, patches) in plan.patches.iter().enumerate() {
+            for corners in patches {
+                svg.polygon(corners.map(|[x, y, _]| axes.at(x, y)), &patch_style(foot_color(e)));
+            }
+        }
         for e in 0..plan.foot_names.len() {
             let path = foot_samples(plan, e).map(|(_, p)| axes.at(p[0], p[1]));
             svg.polyline(path, &format!("{} stroke-opacity=\"0.75\"", stroke(e, 1.1)));
@@ -102,7 +128,6 @@ fn from_above(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
         svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
         svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
     });
-    height_scale(svg, frame, &heights);
 }
 
 /// Index and position of each sample of one foot.
@@ -117,81 +142,7 @@ fn footholds(plan: &Plan, foot: usize) -> impl Iterator<Item = (usize, [f64; 3])
     foot_samples(plan, foot).filter(move |&(n, _)| stands(n) && (n == 0 || !stands(n - 1)))
 }
 
-/// Bilinear interpolation of the ground's height, m; none outside the grid.
-fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
-    let (u, v) = ((x - ground.origin[0]) / ground.spacing[0], (y - ground.origin[1]) / ground.spacing[1]);
-    let (most_u, most_v) = ((ground.columns - 1) as f64, (ground.rows - 1) as f64);
-    if !(0.0..=most_u).contains(&u) || !(0.0..=most_v).contains(&v) {
-        return None;
-    }
-    let (i, j) = ((u as usize).min(ground.columns - 2), (v as usize).min(ground.rows - 2));
-    let (a, b) = (u - i as f64, v - j as f64);
-    let h = |i: usize, j: usize| ground.height[j * ground.columns + i];
-    let low = h(i, j) * (1.0 - a) + h(i + 1, j) * a;
-    let high = h(i, j + 1) * (1.0 - a) + h(i + 1, j + 1) * a;
-    Some(low * (1.0 - b) + high * b)
-}
-
-/// Heights over the frame at the centers of `RASTER` × `RASTER` cells, row by row from the top.
-fn raster(axes: &Axes, ground: &GroundGrid) -> Vec<Option<f64>> {
-    let at = |[a, b]: [f64; 2], i: usize| a + (b - a) * (i as f64 + 0.5) / RASTER as f64;
-    let rows = (0..RASTER).rev().flat_map(|j| (0..RASTER).map(move |i| (i, j)));
-    rows.map(|(i, j)| height(ground, at(axes.x, i), at(axes.y, j))).collect()
-}
-
-/// Smallest and largest height within the frame, at least [`MIN_HEIGHT_RANGE`] apart.
-fn height_range(raster: &[Option<f64>]) -> [f64; 2] {
-    let [low, high] = range(raster.iter().flatten().copied(), 0.0);
-    if high - low >= MIN_HEIGHT_RANGE {
-        return [low, high];
-    }
-    let middle = 0.5 * (low + high);
-    [middle - 0.5 * MIN_HEIGHT_RANGE, middle + 0.5 * MIN_HEIGHT_RANGE]
-}
-
-/// Draws height as bands of color; neighboring cells of one band are one rectangle.
-fn shading(svg: &mut Svg, [left, top, width, height]: [f64; 4], heights: &[Option<f64>]) {
-    let [low, high] = height_range(heights);
-    let band =
-        |h: &Option<f64>| h.map(|h| (((h - low) / (high - low) * BANDS as f64) as usize).min(BANDS - 1));
-    let (cell_width, cell_height) = (width / RASTER as f64, height / RASTER as f64);
-    for (j, row) in heights.chunks(RASTER).enumerate() {
-        let mut begin = 0;
-        for cells in row.chunk_by(|a, b| band(a) == band(b)) {
-            if let Some(band) = band(&cells[0]) {
-                let strip = [
-                    left + begin as f64 * cell_width,
-                    top + j as f64 * cell_height,
-                    cells.len() as f64 * cell_width + OVERLAP,
-                    cell_height + OVERLAP,
-                ];
-                svg.rect(strip, &band_style(band));
-            }
-            begin += cells.len();
-        }
-    }
-}
-
-/// From pale blue (low) over sand to brown (high), light enough for paths to stand out.
-fn band_style(band: usize) -> String {
-    const STOPS: [[f64; 3]; 3] = [[206.0, 222.0, 234.0], [243.0, 238.0, 222.0], [196.0, 160.0, 118.0]];
-    format!("fill=\"{}\"", ramp(&STOPS, (band as f64 + 0.5) / BANDS as f64))
-}
-
-/// The scale of heights, right of the view from above.
-fn height_scale(svg: &mut Svg, [left, top, width, height]: [f64; 4], heights: &[Option<f64>]) {
-    let [low, high] = height_range(heights);
-    let (x, step) = (left + width + 8.0, height / BANDS as f64);
-    for band in 0..BANDS {
-        let y = top + height - (band + 1) as f64 * step;
-        svg.rect([x, y, 12.0, step + OVERLAP], &band_style(band));
-    }
-    let font = Font { size: 11.0, ..Font::TICK }.anchored("start");
-    svg.text([x, top - 6.0], &format!("{high:.2} m"), font);
-    svg.text([x, top + height + 15.0], &format!("{low:.2} m"), font);
-}
-
-fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
+fn from_the_side(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4]) {
     // The horizontal axis runs from start to goal, or along x when they coincide.
     let [a, b] = [plan.base_position[0], plan.base_position[plan.t.len() - 1]];
     let length = (b[0] - a[0]).hypot(b[1] - a[1]);
@@ -201,10 +152,7 @@ fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
 
     let x = range(plan.base_position.iter().chain(&plan.foot_position).map(along), 0.04);
     // The ground on the straight line from start to goal.
-    let profile: Vec<[f64; 2]> = (0..=PROFILE)
-        .map(|i| x[0] + (x[1] - x[0]) * f64::from(i) / f64::from(PROFILE))
-        .filter_map(|s| Some([s, height(&plan.ground, a[0] + s * direction[0], a[1] + s * direction[1])?]))
-        .collect();
+    let profile = ground.profile([a[0], a[1]], direction, x);
     let heights = plan.base_position.iter().chain(&plan.foot_position).map(|p| p[2]);
     let y = range(heights.chain(profile.iter().map(|p| p[1])), 0.08);
     let axes = Axes::equal(frame, x, y);
@@ -214,6 +162,8 @@ fn from_the_side(svg: &mut Svg, plan: &Plan, frame: [f64; 4]) {
         let outline: Vec<[f64; 2]> =
             profile.iter().copied().chain(ends).map(|[s, z]| axes.at(s, z)).collect();
         svg.polygon(outline, "fill=\"#e6dcc6\" stroke=\"#8a7650\" stroke-width=\"1.2\"");
+        let cleared = ground.cleared([a[0], a[1]], direction, x);
+        svg.polyline(cleared.iter().map(|[s, z]| axes.at(*s, *z)), CLEARED);
     });
     axes.draw(
         svg,

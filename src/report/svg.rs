@@ -63,6 +63,15 @@ impl Svg {
         ));
     }
 
+    /// Defines a fill of slanted lines, `url(#NAME)`.
+    pub fn hatching(&mut self, name: &str) {
+        let _ = writeln!(
+            self.body,
+            "<pattern id=\"{name}\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\" \
+             fill=\"#333\"><rect width=\"6\" height=\"6\" fill-opacity=\"0.12\"/><rect width=\"1.2\" height=\"6\" fill-opacity=\"0.5\"/></pattern>"
+        );
+    }
+
     /// Many rectangles of one style, as one element.
     pub fn rects(&mut self, all: impl IntoIterator<Item = [f64; 4]>, style: &str) {
         let mut path = String::new();

@@ -3,8 +3,10 @@
 import importlib.metadata
 import json
 import os
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +122,18 @@ def test_without_ffmpeg_there_is_a_message_and_no_film(
     assert main([str(standing_plan), "-o", str(tmp_path), "--no-second-opinion", "--no-pictures", "--video"]) == 0
     assert "ffmpeg" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_a_still_shows_the_whole_walk(ripple_plan: Path, tmp_path: Path) -> None:
+    assert main([str(ripple_plan), "-o", str(tmp_path), "--no-second-opinion", "--no-pictures", "--still"]) == 0
+    picture = (tmp_path / "ripple.png").read_bytes()
+    columns, rows = struct.unpack(">II", picture[16:24])
+    assert (columns, rows) == film.STILL_SIZE
+    start = picture.index(b"IDAT") + 4
+    lines = np.frombuffer(zlib.decompressobj().decompress(picture[start:]), np.uint8).reshape(rows, 1 + 3 * columns)
+    red, green, blue = lines[:, 1:].reshape(rows, columns, 3).astype(int).transpose(2, 0, 1)
+    robot = (red > 2 * green) & (red > 2 * blue)
+    assert robot.mean() > 0.02
 
 
 def test_the_package_requires_the_version_of_mujoco_that_it_was_calibrated_with() -> None:

@@ -13,7 +13,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -25,10 +27,17 @@ from .validation import Validation
 
 PICTURES, FRAMES_PER_SECOND = 6, 30
 PICTURE_SPAN = 0.02, 0.98  # fractions of the replay at the first and the last picture
-PICTURE_SIZE, FILM_SIZE = (480, 270), (640, 360)  # pixels
-DRAWN_CELL = 0.05  # m, of the terrain as drawn
+MOMENTS = 3  # of the walk, together in the still
+PICTURE_SIZE, FILM_SIZE, STILL_SIZE = (480, 270), (640, 360), (1280, 560)  # pixels
+DRAWN_CELL, FINE_CELL = 0.05, 0.02  # m, of the terrain as drawn, and as drawn in the still
 DRAWN_MARGIN = 1.5  # m of terrain that is drawn around the robot's path
-SHADOW_SIZE = 1024  # pixels, of the square shadow map: without a GPU, the usual 4096 take as long as all the rest
+SHADOW_SIZE, STILL_SHADOW_SIZE = 1024, 4096  # pixels, of the square shadow map: without a GPU, 4096 take as long as all the rest
+STILL_AZIMUTH, STILL_ELEVATION = (
+    66.0,
+    -18.0,
+)  # degrees, from the direction of the walk, so that the camera is behind it, to the right
+STILL_DROP = 0.35  # m that the camera of the still looks below the path of the center of mass
+STILL_DISTANCE, LEAST_DISTANCE = 0.55, 1.5  # of that camera: by the length of the walk, and this, m, more
 TIME_LIMIT, TIME_LIMIT_OF_FILM = 60.0, 30.0  # s, and s more for each second of a film
 PACKAGES = "On Debian: apt install libegl1 libgl1-mesa-dri (or libosmesa6) for pictures, and ffmpeg for films."
 
@@ -48,7 +57,7 @@ def ffmpeg() -> str | None:
         return None
 
 
-def _drawn_terrain(v: Validation) -> Heightfield:
+def _drawn_terrain(v: Validation, cell: float) -> Heightfield:
     """The terrain around the robot's path, on a coarser grid: without a GPU, a film of half a million triangles takes minutes."""
     terrain = v.shown.terrain
     rows, columns = terrain.heights.shape
@@ -56,47 +65,63 @@ def _drawn_terrain(v: Validation) -> Heightfield:
     high = v.plan.base_position[:, :2].max(0) + DRAWN_MARGIN
     first = np.clip(np.floor((low - terrain.origin) / terrain.spacing).astype(int), 0, [columns - 2, rows - 2])
     last = np.clip(np.ceil((high - terrain.origin) / terrain.spacing).astype(int), first + 1, [columns - 1, rows - 1])
-    every = np.minimum(np.maximum(1, np.floor(DRAWN_CELL / terrain.spacing + 1e-9).astype(int)), last - first)
+    every = np.minimum(np.maximum(1, np.floor(cell / terrain.spacing + 1e-9).astype(int)), last - first)
     heights = terrain.heights[first[1] : last[1] + 1 : every[1], first[0] : last[0] + 1 : every[0]]
     return Heightfield(heights, terrain.origin + first * terrain.spacing, every * terrain.spacing)
 
 
-def _render(v: Validation, times: npt.NDArray[np.float64], size: tuple[int, int], output: Path, seconds: float) -> None:
-    """Render the trial to look at, at `times` s, to `output` (an .mp4, or a folder of PNG files), within `seconds`."""
+@dataclass(frozen=True)
+class _Job:
+    """What `render.py` is to draw of the trial to look at."""
+
+    times: npt.NDArray[np.float64]  # s
+    size: tuple[int, int]  # pixels
+    output: Path  # an .mp4, a .png of all times together, or a folder of PNG files
+    seconds: float  # that it may take
+    cell: float = DRAWN_CELL  # m, of the terrain
+    shadow_size: int = SHADOW_SIZE
+    camera: dict[str, Any] | None = None  # distance, azimuth, elevation and lookat; else it follows the robot
+
+
+def _render(v: Validation, job: _Job) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _write_scene(v, times, folder)
-        job = {
-            "model": str(folder / "world.mjb"),
-            "frames": str(folder / "frames.npz"),
-            "size": size,
-            "output": str(output),
-            "ffmpeg": ffmpeg(),
-            "frames_per_second": FRAMES_PER_SECOND,
-        }
+        _write_scene(v, job, folder)
+        text = json.dumps(
+            {
+                "model": str(folder / "world.mjb"),
+                "frames": str(folder / "frames.npz"),
+                "size": job.size,
+                "output": str(job.output),
+                "ffmpeg": ffmpeg(),
+                "frames_per_second": FRAMES_PER_SECOND,
+                "camera": job.camera,
+            }
+        )
         errors = ""
         for backend in [b] if (b := os.environ.get("MUJOCO_GL")) else ["egl", "osmesa"]:
-            error = _render_with(backend, json.dumps(job), seconds)
+            error = _render_with(backend, text, job.seconds)
             if error is None:
                 return
             errors += f" {backend}: {error}."
     raise FilmError(f"No pictures: neither EGL nor OSMesa could render.{errors} {PACKAGES}")
 
 
-def _write_scene(v: Validation, times: npt.NDArray[np.float64], folder: Path) -> None:
+def _write_scene(v: Validation, job: _Job, folder: Path) -> None:
     """The model and the frames of the trial to look at, for `render.py`."""
     trial, robot = v.shown, v.plan.robot
     world = build_world(
         v.model_path,
-        _drawn_terrain(v),
+        _drawn_terrain(v, job.cell),
         robot.friction,
         robot.gravity,
         disturbance=v.settings.disturbance,
-        cell=DRAWN_CELL,
+        cell=job.cell,
     )
-    world.vis.quality.shadowsize = SHADOW_SIZE
+    world.vis.quality.shadowsize = job.shadow_size
+    world.vis.global_.offwidth, world.vis.global_.offheight = job.size
     mujoco.mj_saveModel(world, str(folder / "world.mjb"), None)
-    at = np.minimum(np.searchsorted(trial.replay.t, times), len(trial.replay.t) - 1)
+    at = np.minimum(np.searchsorted(trial.replay.t, job.times), len(trial.replay.t) - 1)
     np.savez(
         folder / "frames.npz",
         qpos=trial.replay.qpos[at],
@@ -124,8 +149,24 @@ def pictures(v: Validation) -> list[tuple[float, bytes]]:
     end = float(v.shown.replay.t[-1])
     times = np.linspace(*PICTURE_SPAN, PICTURES) * end
     with tempfile.TemporaryDirectory() as folder:
-        _render(v, times, PICTURE_SIZE, Path(folder), TIME_LIMIT)
+        _render(v, _Job(times, PICTURE_SIZE, Path(folder), TIME_LIMIT))
         return [(float(t), (Path(folder) / f"{i}.png").read_bytes()) for i, t in enumerate(times)]
+
+
+def still(v: Validation, target: Path) -> None:
+    """The trial to look at in one picture: the robot at a few moments."""
+    path = v.plan.base_position
+    # At equal distances along the walk.
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    times = np.interp(np.linspace(0, way[-1], MOMENTS), way, v.plan.t) + (v.shown.replay.t[-1] - v.plan.t[-1])
+    step = path[-1] - path[0]
+    camera = {
+        "distance": STILL_DISTANCE * float(np.hypot(*step[:2])) + LEAST_DISTANCE,
+        "azimuth": STILL_AZIMUTH + float(np.degrees(np.arctan2(step[1], step[0]))),
+        "elevation": STILL_ELEVATION,
+        "lookat": list((path[0] + path[-1]) / 2 - [0, 0, STILL_DROP]),
+    }
+    _render(v, _Job(times, STILL_SIZE, target, TIME_LIMIT, FINE_CELL, STILL_SHADOW_SIZE, camera))
 
 
 def video(v: Validation, target: Path) -> None:
@@ -134,4 +175,4 @@ def video(v: Validation, target: Path) -> None:
         raise FilmError(f"No film: ffmpeg was not found. {PACKAGES} Or: pip install imageio-ffmpeg")
     end = float(v.shown.replay.t[-1])
     times = np.arange(int(end * FRAMES_PER_SECOND) + 1) / FRAMES_PER_SECOND
-    _render(v, times, FILM_SIZE, target, TIME_LIMIT + TIME_LIMIT_OF_FILM * end)
+    _render(v, _Job(times, FILM_SIZE, target, TIME_LIMIT + TIME_LIMIT_OF_FILM * end))

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Array
-from .files import replacing
+from .files import replacing, write_bytes
 
 Image = npt.NDArray[np.uint8]
 
@@ -57,13 +57,17 @@ def _arrows(scene: Any, points: Array, forces: Array) -> None:
             scene.ngeom += 1
 
 
-def _images(job: dict[str, Any]) -> Iterator[Image]:
-    """The frames of a job, rendered."""
-    model, frames = mujoco.MjModel.from_binary_path(job["model"]), np.load(job["frames"])
+def _renderer(job: dict[str, Any], model: Any) -> Any:
     width, height = job["size"]
+    return mujoco.Renderer(model, height, width)
+
+
+def _images(job: dict[str, Any]) -> Iterator[Image]:
+    """The frames of a job, rendered by a camera that follows the robot."""
+    model, frames = mujoco.MjModel.from_binary_path(job["model"]), np.load(job["frames"])
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     camera.distance, camera.azimuth, camera.elevation = CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION
-    with mujoco.Renderer(model, height, width) as renderer:
+    with _renderer(job, model) as renderer:
         for qpos, look, points, forces in zip(*(frames[name] for name in ("qpos", "look", "point", "force")), strict=True):
             data.qpos[:] = qpos
             mujoco.mj_forward(model, data)
@@ -71,6 +75,24 @@ def _images(job: dict[str, Any]) -> Iterator[Image]:
             renderer.update_scene(data, camera)
             _arrows(renderer.scene, points, forces)
             yield renderer.render()
+
+
+def _together(job: dict[str, Any]) -> Image:
+    """All frames of a job in one picture, by a camera that stands still."""
+    model, frames = mujoco.MjModel.from_binary_path(job["model"]), np.load(job["frames"])
+    data, camera = mujoco.MjData(model), mujoco.MjvCamera()
+    for name, value in job["camera"].items():
+        setattr(camera, name, value)
+    with _renderer(job, model) as renderer:
+        for number, qpos in enumerate(frames["qpos"]):
+            data.qpos[:] = qpos
+            mujoco.mj_forward(model, data)
+            if number == 0:
+                renderer.update_scene(data, camera)
+            else:
+                robot = mujoco.mjtCatBit.mjCAT_DYNAMIC
+                mujoco.mjv_addGeoms(model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), robot, renderer.scene)
+        return np.asarray(renderer.render())
 
 
 def _write_film(job: dict[str, Any], target: Path) -> None:
@@ -85,11 +107,14 @@ def _write_film(job: dict[str, Any], target: Path) -> None:
 
 
 def main(job_text: str) -> None:
-    """`job_text` is JSON: `model` and `frames` (files), `size` [width, height], `output` (an .mp4, or a folder), `ffmpeg`, `frames_per_second`."""
+    """`job_text` is JSON: `model` and `frames` (files), `size` [width, height], `output` (an .mp4, a .png of all frames together, or a
+    folder), `ffmpeg`, `frames_per_second`, and `camera` for a .png."""
     job = json.loads(job_text)
     output = Path(job["output"])
     if output.suffix == ".mp4":
         _write_film(job, output)
+    elif output.suffix == ".png":
+        write_bytes(output, png(_together(job)))
     else:
         for i, image in enumerate(_images(job)):
             (output / f"{i}.png").write_bytes(png(image))

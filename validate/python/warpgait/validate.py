@@ -62,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-raw", action="store_true", help="skip the replay on the raw heightfield")
     parser.add_argument("--no-pictures", action="store_true", help="no pictures in the report")
     parser.add_argument("--video", action="store_true", help="write NAME.mp4 as well")
+    parser.add_argument("--still", action="store_true", help="write NAME.png as well: the whole walk in one picture")
     parser.add_argument("--json", action="store_true", help="print the report as JSON and nothing else")
     parser.add_argument("--no-files", action="store_true", help="write no files, only print the verdict")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error")
@@ -191,6 +192,9 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
         if not options.no_pictures:
             say("pictures")
             pictures = film.pictures(found)
+        if options.still:
+            say("still")
+            film.still(found, folder / f"{stem}.png")
         if options.video:
             say("film")
             film.video(found, folder / f"{stem}.mp4")
