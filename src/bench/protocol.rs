@@ -11,8 +11,10 @@ use super::routes::{
 pub const TERRAINS: [&str; 4] = ["rippled", "conic", "hilly", "pit"];
 /// Their levels.
 pub const LEVELS: [&str; 3] = ["easy", "medium", "hard"];
-/// Both formulations.
-pub const FORMULATIONS: [&str; 2] = ["warped", "direct"];
+/// The formulations; where none is selected, only the paper's two are run.
+pub const FORMULATIONS: [&str; 3] = ["warped", "direct", "hybrid"];
+/// Those of the paper.
+const OF_THE_PAPER: usize = 2;
 /// Tolerance of the NLP on its largest violation.
 pub const TOLERANCE: f64 = 1e-4;
 
@@ -134,7 +136,7 @@ impl Protocol<'_> {
 
     fn formulations(&self) -> Vec<String> {
         match self.options.formulations.is_empty() {
-            true => FORMULATIONS.map(String::from).to_vec(),
+            true => FORMULATIONS.iter().take(OF_THE_PAPER).map(ToString::to_string).collect(),
             false => self.options.formulations.clone(),
         }
     }

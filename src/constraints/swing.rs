@@ -11,7 +11,7 @@
 //! control points are bounded as well (see `planner::problem`).
 //!
 //! Rows: by foot, one for each sample strictly inside a swing, then one for the middle of each swing; m. Where durations are
-//! optimized or the ground has edges, one for each point of the path in [`swing_points`].
+//! optimized or the ground has edges, one for each of further points of the path (see `nlp::state`).
 
 use nalgebra::{Matrix3, Vector3};
 

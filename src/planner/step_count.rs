@@ -18,7 +18,7 @@ const MORE_STEPS: f64 = 0.1;
 /// such as on a staircase with short treads.
 ///
 /// # Errors
-/// Those of the gait and, if no number of steps will do, those of [`assign`] for the usual number.
+/// Those of the gait and, if no number of steps will do, what is wrong with the usual number.
 pub fn choose_gait(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Gait> {
     let usual = Gait::of(scenario, robot)?;
     let Some(contact) = &surfaces.contact else { return Ok(usual) };

@@ -11,14 +11,11 @@ pub(super) const GRAY: &str = "stroke=\"#555\"";
 /// Font of a page's title.
 pub(super) const PAGE_TITLE: Font = Font { size: 17.0, ..Font::TITLE };
 
-/// Blue for the warped formulation and red for the direct one, paler with two threads.
+/// Blue for the warped formulation, red for the direct and green for the hybrid one, paler with two threads.
 pub(super) fn color(method: &str) -> &'static str {
-    match (method.starts_with(FORMULATIONS[0]), method.ends_with(TWO_THREADS)) {
-        (true, false) => "#2166ac",
-        (true, true) => "#92c5de",
-        (false, false) => "#c8352c",
-        (false, true) => "#f4a582",
-    }
+    const COLORS: [[&str; 2]; 3] = [["#2166ac", "#92c5de"], ["#c8352c", "#f4a582"], ["#1b7837", "#a6dba0"]];
+    let formulation = FORMULATIONS.iter().position(|name| method.starts_with(name)).unwrap_or(1);
+    COLORS[formulation][usize::from(method.ends_with(TWO_THREADS))]
 }
 
 /// Stroke style of a method's curve.

@@ -70,7 +70,7 @@ class Gains:
 
 def swing_progress(reference: Reference) -> Array:
     """Fraction (K, E) of the current swing that is over; zero in stance."""
-    progress = np.zeros(reference.contact.shape)
+    progress: Array = np.zeros(reference.contact.shape)
     for e in range(progress.shape[1]):
         for first, end in runs(~reference.contact[:, e]):
             progress[first:end, e] = np.arange(end - first) / (end - first)

@@ -55,7 +55,9 @@ class ShankShape:
 
     knee_radius: float  # of the shapes around the KFE axis
     corner: tuple[float, float]  # of the shank, from that axis: along the line to the foot's center, and across it
-    tube: tuple[float, float]  # the upper end of the axis of the shank's longest round shape, which leads to the foot; the same way
+    tube: tuple[
+        float, float
+    ]  # the upper end of the axis of the shank's longest round shape, which leads to the foot; the same way
     tube_radius: float
 
 
