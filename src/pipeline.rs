@@ -12,7 +12,7 @@ use crate::ipopt::{INTERRUPT, NlpProblem};
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
 use crate::planner::derivatives::{self, DerivativeError};
-use crate::planner::{self, GaitProblem, Host, Motion, Progress, Task};
+use crate::planner::{self, GaitProblem, Host, Motion, Progress, Steps, Task};
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
 use crate::terrain::{self, Ground, Surfaces};
 use crate::trajectory::Gait;
@@ -85,8 +85,8 @@ impl BuiltMap {
 
 /// All that a scenario names, read and built before anything is computed.
 pub struct Prepared {
-    /// Its gait.
-    pub gait: Gait,
+    /// When the feet step, and where.
+    pub steps: Steps,
     /// The ground and how it came about.
     pub ground: Ground,
     /// Its surfaces, shared by all models.
@@ -110,14 +110,14 @@ impl Prepared {
             let _ = observer(&Event::Note(&format!("terrain: {note}")));
         }
         let surfaces = Surfaces::of(scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
-        let gait = planner::choose_gait(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
-        Ok(Self { gait, ground, surfaces })
+        let steps = Steps::of(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
+        Ok(Self { steps, ground, surfaces })
     }
 
     /// What the planner is given.
     pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
         let (scenario, robot) = (&loaded.scenario, &loaded.robot);
-        Task { scenario, robot, gait: &self.gait, surfaces: &self.surfaces, map }
+        Task { scenario, robot, steps: &self.steps, surfaces: &self.surfaces, map }
     }
 }
 

@@ -5,11 +5,10 @@ use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use warpgait::ipopt::NlpProblem;
 use warpgait::nlp::Constraint;
-use warpgait::planner::{GaitProblem, Task, derivatives};
+use warpgait::planner::{GaitProblem, Steps, Task, derivatives};
 use warpgait::robot::Robot;
 use warpgait::scenario::{Formulation, Scenario};
 use warpgait::terrain::Surfaces;
-use warpgait::trajectory::Gait;
 use warpgait::warp::WarpMap;
 
 /// Largest relative error allowed; the step of the differences is 1e-5, their own error some 1e-9.
@@ -42,9 +41,9 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let surfaces = Surfaces::of(&scenario, &robot, &ground).expect("surfaces");
     // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
     let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));
-    let gait = Gait::of(&scenario, &robot).expect("a gait");
+    let steps = Steps::of(&scenario, &robot, &surfaces).expect("steps");
     let map = (scenario.formulation != Formulation::Direct).then_some(&map);
-    let task = Task { scenario: &scenario, robot: &robot, gait: &gait, surfaces: &surfaces, map };
+    let task = Task { scenario: &scenario, robot: &robot, steps: &steps, surfaces: &surfaces, map };
     task.problem().expect("a problem")
 }
 

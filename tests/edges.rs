@@ -102,13 +102,14 @@ fn ground_that_cannot_be_walked_is_refused_with_the_place() {
 
 #[test]
 fn short_treads_get_more_steps() {
-    let stairs = "0.12*max(0, min(4, floor((x - 0.3)/0.3)))";
     let steps = |expression: &str| {
-        let text = scenario("anymal_c", "hybrid", expression, 1.8);
+        let text = scenario("anymal_c", "hybrid", expression, 2.6)
+            .replace("horizon = 6.0", "horizon = 10.0")
+            .replace("2.4, -1.0", "3.6, -1.0");
         let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
         let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("stairs");
-        prepared.gait.swings[0].len()
+        prepared.steps.gait.swings[0].len()
     };
-    let usual = steps("0*x");
-    assert!(steps(stairs) > usual, "{} and {usual}", steps(stairs));
+    let [stairs, flat] = ["0.15*max(0, min(5, 1 + floor((x - 0.6)/0.32)))", "0*x"].map(steps);
+    assert!(stairs > flat, "{stairs} steps on the stairs and {flat} on the flat");
 }

@@ -31,8 +31,11 @@ use crate::trajectory::rotation::cross_matrix;
 /// Every how many samples there are rows.
 const STRIDE: usize = 2;
 
-/// Near edges, points on the axis of the shank's tube: fractions of the way from its upper end to the foot.
-const ALONG_TUBE: [f64; 6] = [0.0, 0.17, 0.34, 0.51, 0.68, 0.85];
+/// Near edges, largest distance between the points of the shank's tube that have rows, in radii of the foot: an edge between two of
+/// them cannot reach the tube then.
+const TUBE_SPACING: f64 = 1.2;
+/// A foot counts as at least this thick in that, in lengths of the shank.
+const LEAST_RADIUS: f64 = 0.03;
 
 /// The clearance of knees and shanks.
 #[derive(Clone, Debug)]
@@ -95,16 +98,26 @@ fn is_near_edge(model: &Model, foot: usize, k: usize, shank: f64) -> bool {
 
 impl LegPlace {
     fn rows(&self) -> usize {
-        if self.near_edge { 2 + ALONG_TUBE.len() } else { 2 }
+        2 + self.tube_points()
+    }
+
+    /// Points of the tube from its upper end on; the foot itself is not among them.
+    fn tube_points(&self) -> usize {
+        let Leg { tube, shank, foot_radius, .. } = self.leg;
+        let spacing = TUBE_SPACING * foot_radius.max(LEAST_RADIUS * shank);
+        if self.near_edge { ((shank - tube[0]).hypot(tube[1]) / spacing).ceil() as usize } else { 0 }
     }
 
     /// The points v(r): knee, corner, and near edges those of the tube.
     fn points<T: Scalar>(&self, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
         let Leg { corner, tube, shank, .. } = self.leg;
         let posture = self.leg.posture(r);
-        let toward_foot = move |s: &f64| [tube[0] + s * (shank - tube[0]), (1.0 - s) * tube[1]];
-        let others = if self.near_edge { &ALONG_TUBE[..] } else { &[] };
-        let on_shank = [[0.0, 0.0], corner].into_iter().chain(others.iter().map(toward_foot));
+        let count = self.tube_points();
+        let of_tube = (0..count).map(move |n| {
+            let s = n as f64 / count as f64;
+            [tube[0] + s * (shank - tube[0]), (1.0 - s) * tube[1]]
+        });
+        let on_shank = [[0.0, 0.0], corner].into_iter().chain(of_tube);
         on_shank.map(move |point| posture.on_shank(point))
     }
 }

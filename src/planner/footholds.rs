@@ -24,8 +24,8 @@ pub fn assign(scenario: &Scenario, model: &Model, contact: &ContactGround) -> Re
     let (chosen, cost) = Search::new(model, contact, &path).run()?;
     let patch = |place: &Place| contact.patch(place.cell);
     let patches: Vec<Vec<Patch>> = chosen.iter().map(|places| places.iter().map(patch).collect()).collect();
-    let walkable = ensure_walkable(model, &path.retimed(&patches), &chosen);
-    Ok(Assignment { patches, cost, walkable })
+    ensure_walkable(model, &path.retimed(&patches), &chosen)?;
+    Ok(Assignment { patches, cost })
 }
 
 /// A patch for every stance.
@@ -34,8 +34,6 @@ pub struct Assignment {
     pub patches: Vec<Vec<Patch>>,
     /// What the search minimized, m².
     pub cost: f64,
-    /// An error if there is a step or a foothold that no motion of the base makes possible.
-    pub walkable: Result<()>,
 }
 
 /// Refuses steps and footholds that no motion of the base makes possible; `path` is timed for them.

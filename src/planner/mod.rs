@@ -6,7 +6,7 @@
 //! | `base_path` | where the base is guessed to be at each time |
 //! | `footholds` | which patch each stance gets, where feet may stand on patches only |
 //! | `foothold_search` | the search for them |
-//! | `step_count` | how many steps a motion takes over edges |
+//! | `steps` | how many steps a motion takes over edges, and where |
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
@@ -30,7 +30,7 @@ mod retiming;
 pub mod solve;
 pub mod stage;
 mod standing;
-mod step_count;
+mod steps;
 mod stopping;
 mod threads;
 pub mod violation;
@@ -39,4 +39,4 @@ pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
 pub use solve::{Host, Progress, Task, solve};
 pub use stage::Stage;
-pub use step_count::choose_gait;
+pub use steps::Steps;

@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::footholds;
 use super::guess;
 use super::motion::{Motion, Seconds};
 use super::options;
 use super::problem::{Choice, GaitProblem};
 use super::stage::Stage;
+use super::steps::Steps;
 use super::stopping::StoppingRule;
 use super::violation;
 use crate::heightfield::Heightfield;
@@ -18,7 +18,7 @@ use crate::nlp::Model;
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
 use crate::terrain::Surfaces;
-use crate::trajectory::{Gait, Spaces};
+use crate::trajectory::Spaces;
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
@@ -34,8 +34,8 @@ pub struct Task<'a> {
     pub scenario: &'a Scenario,
     /// Its robot.
     pub robot: &'a Robot,
-    /// Its gait.
-    pub gait: &'a Gait,
+    /// When the feet step, and where.
+    pub steps: &'a Steps,
     /// Its ground.
     pub surfaces: &'a Surfaces,
     /// The map over the posture surface, for all formulations but the direct one.
@@ -47,13 +47,9 @@ impl Task<'_> {
     fn model(&self) -> Result<Model> {
         let map = self.map.map(|map| Arc::new(map.clone()));
         let spaces = Spaces::of(self.scenario.formulation, map)?;
-        let mut model = Model::new(self.scenario, self.robot, self.gait, self.surfaces.clone(), spaces);
-        if let Some(contact) = &self.surfaces.contact {
-            let found = footholds::assign(self.scenario, &model, contact)?;
-            found.walkable?;
-            model.patches = found.patches;
-        }
-        Ok(model)
+        let Self { scenario, robot, steps, surfaces, .. } = *self;
+        let model = Model::new(scenario, robot, &steps.gait, surfaces.clone(), spaces);
+        Ok(Model { patches: steps.patches.clone(), ..model })
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -238,7 +234,7 @@ impl<'a> Solve<'a> {
         if stage.is_whole() {
             return self.task.model().map(Some);
         }
-        let Task { scenario, robot, gait, surfaces, .. } = *self.task;
+        let Task { scenario, robot, steps, surfaces, .. } = *self.task;
         let ground = Arc::new(scaled(&surfaces.posture, stage.height_fraction())?);
         let map = match scenario.formulation {
             Formulation::Direct => None,
@@ -248,7 +244,7 @@ impl<'a> Solve<'a> {
             },
         };
         let spaces = Spaces::of(scenario.formulation, map)?;
-        Ok(Some(Model::new(scenario, robot, gait, Surfaces::one(ground), spaces)))
+        Ok(Some(Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces)))
     }
 
     /// Solves from x with at most `budget` iterations.

@@ -1,0 +1,57 @@
+//! How many steps a motion takes over ground with edges, and where they are.
+
+use super::footholds::{Assignment, assign};
+use crate::Result;
+use crate::nlp::Model;
+use crate::robot::Robot;
+use crate::scenario::Scenario;
+use crate::terrain::{Patch, Surfaces};
+use crate::trajectory::space::Space;
+use crate::trajectory::{Gait, Spaces};
+
+/// Lengths of a cycle that are tried besides the usual one, as fractions of it.
+const SHORTER_CYCLES: [f64; 3] = [0.9, 0.8, 0.7];
+/// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
+const MORE_STEPS: f64 = 0.1;
+
+/// When the feet step, and where.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    /// When.
+    pub gait: Gait,
+    /// `[foot][stance]`: where, over ground with edges; else empty.
+    pub patches: Vec<Vec<Patch>>,
+}
+
+impl Steps {
+    /// The steps of a scenario. Over ground with edges, a gait without a given cycle gets more steps where that makes the footholds
+    /// better, such as on a staircase with short treads.
+    ///
+    /// # Errors
+    /// Those of the gait and, if no number of steps will do, what is wrong with the usual number: which foot finds nothing to stand on,
+    /// where and when.
+    pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
+        let usual = Gait::of(scenario, robot)?;
+        let Some(contact) = &surfaces.contact else { return Ok(Self { gait: usual, patches: Vec::new() }) };
+        // In ambient space, so that all formulations get the same patches.
+        let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
+        // The cost of a step, and the steps.
+        let with = |gait: Gait| -> Result<(f64, Self)> {
+            let model = Model::new(scenario, robot, &gait, surfaces.clone(), spaces.clone());
+            let Assignment { patches, cost } = assign(scenario, &model, contact)?;
+            let count = gait.swings.iter().map(Vec::len).sum::<usize>().max(1);
+            Ok((cost / count as f64, Self { gait, patches }))
+        };
+        let mut best = with(usual);
+        for factor in SHORTER_CYCLES {
+            let Some(Ok(gait)) = Gait::with_more_steps(scenario, robot, factor) else { break };
+            if let Ok((cost, steps)) = with(gait) {
+                let cost = cost + MORE_STEPS * (1.0 - factor);
+                if best.as_ref().map_or(true, |(least, _)| cost < *least) {
+                    best = Ok((cost, steps));
+                }
+            }
+        }
+        best.map(|(_, steps)| steps)
+    }
+}
