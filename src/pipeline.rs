@@ -151,7 +151,7 @@ pub fn run(
 
     let _ = observer(&Event::Step(Step::Map));
     let start = Instant::now();
-    let map = match scenario.formulation {
+    let map = match scenario.formulation() {
         Formulation::Direct => None,
         Formulation::Warped | Formulation::Hybrid => {
             match build_map(&prepared.surfaces.posture, &scenario.map, true, observer)? {

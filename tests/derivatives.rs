@@ -42,7 +42,7 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
     let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));
     let steps = Steps::of(&scenario, &robot, &surfaces).expect("steps");
-    let map = (scenario.formulation != Formulation::Direct).then_some(&map);
+    let map = (scenario.formulation() != Formulation::Direct).then_some(&map);
     let task = Task { scenario: &scenario, robot: &robot, steps: &steps, surfaces: &surfaces, map };
     task.problem().expect("a problem")
 }

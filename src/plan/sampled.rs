@@ -150,7 +150,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
         schema: PLAN_SCHEMA,
         warpgait_version: env!("CARGO_PKG_VERSION").into(),
         created: rfc3339(SystemTime::now()),
-        formulation: scenario.formulation,
+        formulation: scenario.formulation(),
         sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,
         scenario: loaded.effective_text.clone(),
         scenario_source: loaded.source_text.clone(),

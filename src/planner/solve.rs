@@ -46,7 +46,7 @@ impl Task<'_> {
     /// The model over the whole terrain.
     fn model(&self) -> Result<Model> {
         let map = self.map.map(|map| Arc::new(map.clone()));
-        let spaces = Spaces::of(self.scenario.formulation, map)?;
+        let spaces = Spaces::of(self.scenario.formulation(), map)?;
         let Self { scenario, robot, steps, surfaces, .. } = *self;
         let model = Model::new(scenario, robot, &steps.gait, surfaces.clone(), spaces);
         Ok(Model { patches: steps.patches.clone(), ..model })
@@ -236,14 +236,14 @@ impl<'a> Solve<'a> {
         }
         let Task { scenario, robot, steps, surfaces, .. } = *self.task;
         let ground = Arc::new(scaled(&surfaces.posture, stage.height_fraction())?);
-        let map = match scenario.formulation {
+        let map = match scenario.formulation() {
             Formulation::Direct => None,
             Formulation::Warped | Formulation::Hybrid => match self.host.build_map(&ground)? {
                 Some(map) => Some(Arc::new(map)),
                 None => return Ok(None),
             },
         };
-        let spaces = Spaces::of(scenario.formulation, map)?;
+        let spaces = Spaces::of(scenario.formulation(), map)?;
         Ok(Some(Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces)))
     }
 
@@ -268,7 +268,7 @@ impl<'a> Solve<'a> {
         let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
         let mut problem = GaitProblem::new(scenario, model, x, choice);
         let centered =
-            (start, hessian, scenario.formulation) == (Start::Guess, Hessian::Exact, Formulation::Warped);
+            (start, hessian, scenario.formulation()) == (Start::Guess, Hessian::Exact, Formulation::Warped);
         let options = options::of(&scenario.solver, hessian, centered, budget);
 
         let mut rule = StoppingRule::new(effort, with_costs, tolerance);

@@ -104,7 +104,7 @@ fn time_steps(document: &Document, scenario: &Scenario) -> Result<()> {
 }
 
 fn law(document: &Document, scenario: &Scenario) -> Result<()> {
-    if scenario.physics.law == Law::NewtonEuler && scenario.formulation == Formulation::Warped {
+    if scenario.physics.law == Law::NewtonEuler && scenario.formulation() == Formulation::Warped {
         let what = "given \"newton-euler\", which needs the orientation's second derivative in time; the map of formulation = \"warped\" is not smooth enough for it (third derivatives of its cubic splines jump from cell to cell); use law = \"pcdm\" (the default) or formulation = \"direct\" or \"hybrid\"";
         return Err(document.error("physics.law", what));
     }

@@ -23,9 +23,8 @@ pub struct Scenario {
     #[serde(default = "default_schema")]
     #[schemars(range(min = 1, max = 1))]
     pub schema: u32,
-    /// The space in which the variables live.
-    #[serde(default)]
-    pub formulation: Formulation,
+    /// The space in which the variables live; default: hybrid where feet stand on patches, else warped.
+    pub formulation: Option<Formulation>,
     /// Duration of the motion T, s.
     #[serde(default = "default_horizon")]
     #[schemars(range(min = 0.1, max = 600.0))]
@@ -67,6 +66,14 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// The space in which the variables live.
+    pub fn formulation(&self) -> Formulation {
+        self.formulation.unwrap_or(match self.footholds() {
+            Footholds::Patches => Formulation::Hybrid,
+            Footholds::Anywhere => Formulation::Warped,
+        })
+    }
+
     /// Where feet may stand.
     pub fn footholds(&self) -> Footholds {
         self.contact.footholds.unwrap_or(match self.terrain {
@@ -87,11 +94,10 @@ fn default_time_step() -> f64 {
 }
 
 /// The space in which the variables live.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Formulation {
     /// Eq. 7–13: variables in F, pushed forward by φ.
-    #[default]
     Warped,
     /// Eq. 1–5: variables in ambient space (the baseline).
     Direct,

@@ -30,7 +30,7 @@ pub fn solved(text: &str) -> (Motion, Plan) {
     let scenario = &loaded.scenario;
     let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
     let build = || warp::build(&prepared.surfaces.posture, &scenario.map, &mut |_| ControlFlow::Continue(()));
-    let map = (scenario.formulation != Formulation::Direct).then(|| build().expect("a map").0);
+    let map = (scenario.formulation() != Formulation::Direct).then(|| build().expect("a map").0);
     let task = prepared.task(&loaded, map.as_ref());
     let motion = solve(&task, &mut Patient(scenario)).expect("a motion");
     let provenance = Provenance { loaded: &loaded, ground: &prepared.ground, map_seconds: 0.0 };

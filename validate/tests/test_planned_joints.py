@@ -58,6 +58,7 @@ LEG_KEYS = (
     "shank =",
     "knee_radius =",
     "corner =",
+    "tube",
     "bend =",
     "foot_radius =",
     "speed_limit =",
