@@ -72,18 +72,22 @@ impl<'a> BasePath<'a> {
             length: ((to[0] - from[0]).hypot(to[1] - from[1]) + turn).max(1e-3),
             timing: None,
         };
-        Ok(if model.patches.is_empty() { path } else { path.retimed(&model.patches) })
+        if model.patches.is_empty() {
+            return Ok(path);
+        }
+        let centers = |patches: &Vec<Patch>| patches.iter().map(|patch| patch.center).collect();
+        Ok(path.retimed(&model.patches.iter().map(centers).collect::<Vec<_>>()))
     }
 
-    /// The same way in another time, so that the feet reach their patches: `patches[foot][stance]`.
-    pub fn retimed(&self, patches: &[Vec<Patch>]) -> Self {
+    /// The same way in another time, so that the feet reach their footholds: `footholds[foot][stance]`, x and y.
+    pub fn retimed(&self, footholds: &[Vec<[f64; 2]>]) -> Self {
         let layout = &self.model.layout;
         let steady = |k: usize| progress(k as f64 * layout.time_step, self.travel[0], self.travel[1]);
         let [from, to] = [0.0, 1.0].map(|u| self.pose_on_way(u).position.xy());
         let length = (to - from).norm();
         let timing = (length > SHORTEST).then(|| {
             let nominal: Vec<f64> = (0..=layout.intervals).map(|k| length * steady(k)).collect();
-            let corridors = self.corridors(patches, &from, &((to - from) / length));
+            let corridors = self.corridors(footholds, &from, &((to - from) / length));
             let s = retimed(&nominal, &corridors, layout.time_step);
             s.into_iter().map(|s| s / length).collect()
         });
@@ -107,16 +111,21 @@ impl<'a> BasePath<'a> {
     }
 
     /// For each stance, from where to where the base can be along the way.
-    fn corridors(&self, patches: &[Vec<Patch>], from: &Vector2<f64>, along: &Vector2<f64>) -> Vec<Corridor> {
+    fn corridors(
+        &self,
+        footholds: &[Vec<[f64; 2]>],
+        from: &Vector2<f64>,
+        along: &Vector2<f64>,
+    ) -> Vec<Corridor> {
         let layout = &self.model.layout;
         let mut corridors = Vec::new();
-        for (i, (foot, patches)) in layout.feet.iter().zip(patches).enumerate() {
+        for (i, (foot, footholds)) in layout.feet.iter().zip(footholds).enumerate() {
             let reach = &self.model.reach[i];
-            for (stance, patch) in foot.stances.iter().zip(patches) {
+            for (stance, foothold) in foot.stances.iter().zip(footholds) {
                 let s = &stance.stance;
                 let heading = self.pose(0.5 * (s.start + s.end) * layout.time_step).rotation;
                 let in_world = |v: [f64; 3]| (heading * Vector3::from(v)).xy();
-                let center = Vector2::from(patch.center) - in_world(reach.center) - from;
+                let center = Vector2::from(*foothold) - in_world(reach.center) - from;
                 let half: f64 = (0..2)
                     .map(|d| {
                         let mut side = [0.0; 3];

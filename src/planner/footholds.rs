@@ -1,7 +1,5 @@
-//! Chooses a patch for every stance before the motion is optimized, where feet may stand on patches only.
-//!
-//! [`super::foothold_search`] chooses a steppable cell for each. The patch is then the largest rectangle around the cell
-//! ([`ContactGround::patch`]), in which the NLP moves the foothold freely.
+//! Chooses a cell for every stance before the motion is optimized, where feet may stand on patches only, and refuses what no motion
+//! can do. [`super::foothold_search`] is the search.
 
 use nalgebra::Vector3;
 
@@ -9,29 +7,29 @@ use super::base_path::BasePath;
 use super::foothold_search::{Place, Search, largest_step};
 use crate::nlp::Model;
 use crate::scenario::Scenario;
-use crate::terrain::{ContactGround, Patch};
+use crate::terrain::ContactGround;
 use crate::{Error, Result};
 
 /// What is beyond a limit by more than this, in standing heights, is refused before the NLP.
 const HOPELESS: f64 = 0.3;
 
-/// `[foot][stance]`.
+/// The best cells for the stances of a model.
 ///
 /// # Errors
 /// Where a foot finds nothing to stand on, or only what is out of its reach: which foot, where, when and by how much.
 pub fn assign(scenario: &Scenario, model: &Model, contact: &ContactGround) -> Result<Assignment> {
     let path = BasePath::new(scenario, model)?;
     let (chosen, cost) = Search::new(model, contact, &path).run()?;
-    let patch = |place: &Place| contact.patch(place.cell);
-    let patches: Vec<Vec<Patch>> = chosen.iter().map(|places| places.iter().map(patch).collect()).collect();
-    ensure_walkable(model, &path.retimed(&patches), &chosen)?;
-    Ok(Assignment { patches, cost })
+    let each = |places: &Vec<Place>| places.iter().map(|place| [place.point.x, place.point.y]).collect();
+    ensure_walkable(model, &path.retimed(&chosen.iter().map(each).collect::<Vec<_>>()), &chosen)?;
+    let cells = chosen.iter().map(|places| places.iter().map(|place| place.cell).collect()).collect();
+    Ok(Assignment { cells, cost })
 }
 
-/// A patch for every stance.
+/// A cell for every stance.
 pub struct Assignment {
-    /// `[foot][stance]`.
-    pub patches: Vec<Vec<Patch>>,
+    /// `[foot][stance]`, cells of the contact ground.
+    pub cells: Vec<Vec<usize>>,
     /// What the search minimized, m².
     pub cost: f64,
 }

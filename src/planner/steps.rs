@@ -35,23 +35,26 @@ impl Steps {
         let Some(contact) = &surfaces.contact else { return Ok(Self { gait: usual, patches: Vec::new() }) };
         // In ambient space, so that all formulations get the same patches.
         let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
-        // The cost of a step, and the steps.
-        let with = |gait: Gait| -> Result<(f64, Self)> {
+        // The cost of a step, the gait, and the cells.
+        let with = |gait: Gait| -> Result<(f64, Gait, Vec<Vec<usize>>)> {
             let model = Model::new(scenario, robot, &gait, surfaces.clone(), spaces.clone());
-            let Assignment { patches, cost } = assign(scenario, &model, contact)?;
+            let Assignment { cells, cost } = assign(scenario, &model, contact)?;
             let count = gait.swings.iter().map(Vec::len).sum::<usize>().max(1);
-            Ok((cost / count as f64, Self { gait, patches }))
+            Ok((cost / count as f64, gait, cells))
         };
         let mut best = with(usual);
         for factor in SHORTER_CYCLES {
             let Some(Ok(gait)) = Gait::with_more_steps(scenario, robot, factor) else { break };
-            if let Ok((cost, steps)) = with(gait) {
+            if let Ok((cost, gait, cells)) = with(gait) {
                 let cost = cost + MORE_STEPS * (1.0 - factor);
-                if best.as_ref().map_or(true, |(least, _)| cost < *least) {
-                    best = Ok((cost, steps));
+                if best.as_ref().map_or(true, |(least, ..)| cost < *least) {
+                    best = Ok((cost, gait, cells));
                 }
             }
         }
-        best.map(|(_, steps)| steps)
+        let (_, gait, cells) = best?;
+        // Around each cell the largest rectangle in which the NLP may move the foothold.
+        let patches = cells.iter().map(|cells| cells.iter().map(|cell| contact.patch(*cell)).collect());
+        Ok(Self { gait, patches: patches.collect() })
     }
 }
