@@ -10,7 +10,7 @@
 //! - what is out of the reach box, sideways and in height, at touch-down, and what the interval lacks to have an inside;
 //! - the squared difference of the step from the base's travel, so that steps are regular;
 //! - what the step is longer or higher than the leg can take;
-//! - a little for each direction in which the ground next to the foot cannot be stood on.
+//! - the roughness of the ground under the foot, and a little for each direction in which the ground next to it cannot be stood on.
 
 use std::collections::HashSet;
 
@@ -36,6 +36,8 @@ const BEYOND: f64 = 20.0;
 const REGULAR: f64 = 0.5;
 /// Cost of each direction without room, m².
 const NO_ROOM: f64 = 2e-4;
+/// Weight of the ground's squared difference from a plane under the foot: 5 mm are worth a step of 3 cm aside.
+const ROUGH: f64 = 36.0;
 /// Weight of the base's difference from steady travel.
 const LATE: f64 = 0.2;
 /// Fraction of that difference that is kept until the middle of a stance.
@@ -56,7 +58,7 @@ pub struct Place {
     pub cell: usize,
     /// On the plane of that cell, m.
     pub point: Vector3<f64>,
-    /// Squared distance to the left or right, and room.
+    /// Squared distance to the left or right, room and roughness.
     cost: f64,
 }
 
@@ -137,8 +139,14 @@ impl<'a> Search<'a> {
                     .contact
                     .steppable_cell([nominal.x + aside * side[0], nominal.y + aside * side[1]])?;
                 let no_room = f64::from(self.contact.closed_directions(cell));
+                let rough = self.contact.roughness(cell);
                 let point = Vector3::from(self.contact.point(cell));
-                Some(Place { s, cell, point, cost: aside * aside + NO_ROOM * no_room })
+                Some(Place {
+                    s,
+                    cell,
+                    point,
+                    cost: aside * aside + NO_ROOM * no_room + ROUGH * rough * rough,
+                })
             })
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
     }

@@ -11,6 +11,8 @@ use crate::heightfield::Grid;
 const HEADINGS: usize = 6;
 /// What may rise beside a foot, as a multiple of the roughness allowed under it.
 const RISE_BESIDE: f64 = 2.0;
+/// The ground of a patch may be rougher than under the foot in its middle by this fraction of what is allowed.
+const EVENNESS: f64 = 0.25;
 /// A patch reaches beyond its outermost cells by this fraction of a cell, so that one of a single cell has an inside.
 const CELL_FRACTION: f64 = 0.1;
 
@@ -150,15 +152,13 @@ impl ContactGround {
 
     /// The largest of some rectangles around a steppable cell within which a foot can stand on the same plane.
     pub fn patch(&self, cell: usize) -> Patch {
-        let [x, y, height] = self.point(cell);
-        let [_, slope_x, slope_y] = self.planes[cell];
-        let patch =
-            Patch { center: [x, y], height, slope: [slope_x, slope_y], heading: 0.0, sides: [[0.0; 2]; 2] };
+        let patch = self.plane_at(cell);
+        let even = (self.roughness(cell) + EVENNESS * self.needs.roughness).min(self.needs.roughness);
         let area = |p: &Patch| (p.sides[0][1] - p.sides[0][0]) * (p.sides[1][1] - p.sides[1][0]);
         (0..HEADINGS)
             .map(|n| {
                 let heading = n as f64 / HEADINGS as f64 * std::f64::consts::FRAC_PI_2;
-                self.grown(Patch { heading, ..patch })
+                self.grown(Patch { heading, ..patch }, even)
             })
             // The first one counts where several are equal.
             .fold(None, |best: Option<Patch>, one| match best {
@@ -168,21 +168,32 @@ impl ContactGround {
             .unwrap_or(patch)
     }
 
-    /// Whether the ground under a foot at a steppable cell is on a patch's plane.
-    fn fits(&self, cell: usize, patch: &Patch, under_foot: &[Offset]) -> bool {
-        let (columns, rows) = (self.grid.columns, self.grid.rows);
-        let (column, row) = (cell % columns, cell / columns);
-        self.steppable[cell]
-            && under_foot.iter().all(|&(u, v, _)| {
-                let clamped = |k: usize, by: isize, count: usize| k.saturating_add_signed(by).min(count - 1);
-                let (c, r) = (clamped(column, u, columns), clamped(row, v, rows));
-                let plane = patch.jet(self.grid.x(c), self.grid.y(r)).h;
-                (self.heights[r * columns + c] - plane).abs() <= self.needs.roughness
-            })
+    /// Largest difference of the ground under a foot at a cell from the cell's own plane, m.
+    pub fn roughness(&self, cell: usize) -> f64 {
+        self.difference(cell, &self.plane_at(cell), &under_foot(&self.grid, self.needs.even))
     }
 
-    /// Moves the sides of a rectangle outward in turn, as long as all that it gains fits.
-    fn grown(&self, patch: Patch) -> Patch {
+    /// Largest difference of the ground under a foot at a cell from a patch's plane, m.
+    fn difference(&self, cell: usize, patch: &Patch, under_foot: &[Offset]) -> f64 {
+        let (columns, rows) = (self.grid.columns, self.grid.rows);
+        let (column, row) = (cell % columns, cell / columns);
+        let difference = |&(u, v, _): &Offset| {
+            let clamped = |k: usize, by: isize, count: usize| k.saturating_add_signed(by).min(count - 1);
+            let (c, r) = (clamped(column, u, columns), clamped(row, v, rows));
+            (self.heights[r * columns + c] - patch.jet(self.grid.x(c), self.grid.y(r)).h).abs()
+        };
+        under_foot.iter().map(difference).fold(0.0, f64::max)
+    }
+
+    /// The plane at a cell as a patch without sides.
+    fn plane_at(&self, cell: usize) -> Patch {
+        let [x, y, height] = self.point(cell);
+        let [_, slope_x, slope_y] = self.planes[cell];
+        Patch { center: [x, y], height, slope: [slope_x, slope_y], heading: 0.0, sides: [[0.0; 2]; 2] }
+    }
+
+    /// Moves the sides of a rectangle outward in turn, as long as all that it gains is steppable and even.
+    fn grown(&self, patch: Patch, even: f64) -> Patch {
         let step = self.grid.spacing[0].min(self.grid.spacing[1]);
         let most = (self.needs.patch / step) as isize;
         let axes = patch.axes();
@@ -191,8 +202,9 @@ impl ContactGround {
             let [x, y] = std::array::from_fn(|c| {
                 patch.center[c] + step * (u as f64 * axes[0][c] + v as f64 * axes[1][c])
             });
-            self.cells_around([x, y])
-                .is_some_and(|mut cells| cells.all(|cell| self.fits(cell, &patch, &under_foot)))
+            self.cells_around([x, y]).is_some_and(|mut cells| {
+                cells.all(|cell| self.steppable[cell] && self.difference(cell, &patch, &under_foot) <= even)
+            })
         };
         let (mut u, mut v) = ([0_isize; 2], [0_isize; 2]);
         loop {
