@@ -101,7 +101,7 @@ impl Prepared {
     pub fn new(loaded: &LoadedScenario, observer: &mut Observer) -> Result<Self> {
         let scenario = &loaded.scenario;
         // Refused before the terrain is read.
-        Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
+        let usual = Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
         // A request to stop takes effect at the first iteration.
         let _ = observer(&Event::Step(Step::Terrain));
         let ground = terrain::build(scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
@@ -111,6 +111,14 @@ impl Prepared {
         }
         let surfaces = Surfaces::of(scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
         let steps = Steps::of(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
+        if steps.gait != usual {
+            let [more, fewer] = [&steps.gait, &usual].map(|gait| gait.swings.iter().map(Vec::len).max());
+            let _ = observer(&Event::Note(&format!(
+                "gait: {} steps of each foot instead of {}, for better footholds (gait.cycle sets it)",
+                more.unwrap_or(0),
+                fewer.unwrap_or(0)
+            )));
+        }
         Ok(Self { steps, ground, surfaces })
     }
 
