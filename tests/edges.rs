@@ -49,6 +49,21 @@ fn a_plan_with_patches_survives_its_file_and_every_lie_about_them_is_noticed() {
     assert_eq!(read.patches, plan.patches);
     assert_eq!(objections(&read), Vec::<String>::new());
 
+    // What is no rectangle of a plane is refused by the reader.
+    let bad: [fn(&mut [[f64; 3]; 4]); 4] = [
+        |corners| corners[2][2] += 0.05,
+        |corners| corners.swap(1, 2),
+        |corners| *corners = [corners[0]; 4],
+        |corners| corners[2][0] = 1e308,
+    ];
+    for spoil in bad {
+        let mut plan = plan.clone();
+        spoil(&mut plan.patches[2][1]);
+        plan.write(&path).unwrap();
+        let message = Plan::read(&path).unwrap_err().to_string();
+        assert!(message.contains("patch_corners") && message.contains("[2, 1]"), "{message}");
+    }
+
     let spoiled = |spoil: &dyn Fn(&mut Plan)| {
         let mut plan = plan.clone();
         spoil(&mut plan);
@@ -66,6 +81,8 @@ fn a_plan_with_patches_survives_its_file_and_every_lie_about_them_is_noticed() {
     has(shift([0.0, 0.0, 0.05]), "stance_gap");
     has(shift([0.5, 0.0, 0.0]), "patch");
     has(spoiled(&|plan| plan.patches[1].truncate(2)), "patch_count");
+    // Nothing is known about a point: its normal is not a number, and no law may hold because of that.
+    has(spoiled(&|plan| plan.patches.iter_mut().flatten().for_each(|p| *p = [p[0]; 4])), "stance_gap");
     has(spoiled(&|plan| plan.ground.height.iter_mut().for_each(|h| *h += 0.03)), "patch_roughness");
     // A wall in the way of the swings, between the footholds.
     let wall = |plan: &mut Plan| {
@@ -85,8 +102,10 @@ fn ground_that_cannot_be_walked_is_refused_with_the_place() {
     let wall = "0.3*(1 + sign(x - 0.61))";
     let gap = "-0.5*(sign(x - 0.41) - sign(x - 1.21))";
     let needles = "0.5*(sin(40*x)*sin(40*y))";
+    let fence = "0.3*(sign(x - 0.61) - sign(x - 0.69))";
     for (expression, words) in [
         (wall, vec!["foot ", "would have to step from x = ", "0.60 m in height"]),
+        (fence, vec!["foot ", "would have to step from x = ", "over 0.60 m of ground"]),
         (gap, vec!["foot ", "x = ", "y = "]),
         (needles, vec!["there is no place where a foot can stand"]),
     ] {
@@ -98,6 +117,23 @@ fn ground_that_cannot_be_walked_is_refused_with_the_place() {
         };
         assert!(words.iter().all(|part| message.contains(part)), "{message}");
     }
+}
+
+#[test]
+fn ground_far_above_zero_is_walked_as_well() {
+    for formulation in ["hybrid", "warped"] {
+        let (motion, plan) = solved(&scenario("anymal_towr", formulation, &format!("500 + {STEP}"), 1.0));
+        assert!(motion.solved, "{formulation}: {}", motion.status);
+        assert_eq!(objections(&plan), Vec::<String>::new(), "{formulation}");
+    }
+}
+
+#[test]
+fn cells_that_are_too_fine_are_refused_at_once() {
+    let text = scenario("anymal_c", "hybrid", STEP, 1.0).replace("spacing = 0.02", "spacing = 0.001");
+    let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+    let refused = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).err().expect("a refusal");
+    assert!(refused.to_string().contains("too fine"), "{refused}");
 }
 
 #[test]

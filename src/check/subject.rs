@@ -110,9 +110,9 @@ impl Worst {
         Self { value, sample: None, foot: None }
     }
 
-    /// Keeps the larger value.
+    /// Keeps the larger value; what is not a number is larger than everything.
     pub fn meet(&mut self, value: f64, sample: usize, foot: Option<usize>) {
-        if value > self.value {
+        if value > self.value || (value.is_nan() && !self.value.is_nan()) {
             *self = Self { value, sample: Some(sample), foot };
         }
     }

@@ -7,6 +7,9 @@ use crate::Result;
 use crate::files::npz::NpzReader;
 use crate::warp::MapGrid;
 
+/// Relative rounding errors of a rectangle's corners; also its least side, m.
+const RECTANGLE_SLACK: f64 = 1e-6;
+
 /// The newest plan that this reader knows.
 pub const PLAN_SCHEMA: u32 = 1;
 
@@ -123,6 +126,17 @@ fn read_phases(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<f64>>> {
     Ok(phases)
 }
 
+/// Whether four corners, in order, are those of a rectangle as seen from above, and lie on a plane that is not vertical.
+fn is_rectangle([a, b, c, d]: &[[f64; 3]; 4]) -> bool {
+    let side = |to: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|k| to[k] - a[k]) };
+    let (u, v) = (side(b), side(d));
+    let lengths = [u[0].hypot(u[1]), v[0].hypot(v[1])];
+    let slack = RECTANGLE_SLACK * (lengths[0] + lengths[1]);
+    let closes = (0..3).all(|k| (a[k] + u[k] + v[k] - c[k]).abs() <= slack);
+    let square = (u[0] * v[0] + u[1] * v[1]).abs() <= RECTANGLE_SLACK * lengths[0] * lengths[1];
+    closes && square && lengths.iter().all(|length| *length > RECTANGLE_SLACK && length.is_finite())
+}
+
 /// (E, S, 4, 3), padded with NaN at the end of each foot's stances.
 fn read_patches(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<[[f64; 3]; 4]>>> {
     let name = "patch_corners";
@@ -147,6 +161,11 @@ fn read_patches(npz: &mut NpzReader, feet: usize) -> Result<Vec<Vec<[[f64; 3]; 4
         }
         if let Some(at) = (used..stances).find(|&at| bad(at, |v| v.is_nan())) {
             return Err(npz.error(name, format!("[{foot}, {at}] follows a stance without a patch")));
+        }
+        if let Some(at) = row[..used].iter().position(|corners| !is_rectangle(corners)) {
+            let what =
+                format!("[{foot}, {at}] is not a rectangle of a plane, seen from above, in order around it");
+            return Err(npz.error(name, what));
         }
         patches.push(row[..used].to_vec());
     }

@@ -312,7 +312,8 @@ impl<'a> Search<'a> {
     fn excess(&self, foot: usize, from: &Place, to: &Place) -> f64 {
         let step = to.point - from.point;
         let [longest, highest] = largest_step(self.model, self.path, foot);
-        (step.norm() - longest).max(0.0) + (step.z.abs() - highest).max(0.0)
+        let rise = step.z.abs().max(obstacle(self.contact, from, to));
+        (step.norm() - longest).max(0.0) + (rise - highest).max(0.0)
     }
 
     /// `[foot][stance]` of a whole plan, from its last touch-down back to the start.
@@ -334,14 +335,27 @@ impl<'a> Search<'a> {
         let pose = &self.way[self.number(s)];
         let place = pose.position + pose.rotation * self.model.nominal[foot];
         let reach = WINDOW * self.model.reach[foot].half_size[0];
+        let [x_min, x_max, y_min, y_max] = self.contact.grid().extent();
+        let inside = (x_min..=x_max).contains(&place.x) && (y_min..=y_max).contains(&place.y);
+        let why = if inside {
+            "the ground there is a gap, too rough or too steep"
+        } else {
+            "that is beyond the terrain"
+        };
         Error::input(format!(
-            "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: the ground there is a gap, too rough or too steep; choose another way (start, goal)",
+            "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: {why}; choose another way (start, goal)",
             self.model.foot_names[foot],
             place.x,
             place.y,
             sample * self.model.layout.time_step
         ))
     }
+}
+
+/// By how much the ground between two footholds is above the higher one, m.
+pub fn obstacle(contact: &ContactGround, from: &Place, to: &Place) -> f64 {
+    let way = [from, to].map(|place| [place.point.x, place.point.y]);
+    (contact.highest_between(way) - from.point.z.max(to.point.z)).max(0.0)
 }
 
 /// The longest and the highest step of a foot, m.

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::base_path::BasePath;
-use super::foothold_search::{Place, Search, largest_step};
+use super::foothold_search::{Place, Search, largest_step, obstacle};
 use crate::nlp::Model;
 use crate::scenario::Scenario;
 use crate::terrain::ContactGround;
@@ -21,7 +21,7 @@ pub fn assign(scenario: &Scenario, model: &Model, contact: &ContactGround) -> Re
     let path = BasePath::new(scenario, model)?;
     let (chosen, cost) = Search::new(model, contact, &path).run()?;
     let each = |places: &Vec<Place>| places.iter().map(|place| [place.point.x, place.point.y]).collect();
-    ensure_walkable(model, &path.retimed(&chosen.iter().map(each).collect::<Vec<_>>()), &chosen)?;
+    ensure_walkable(model, contact, &path.retimed(&chosen.iter().map(each).collect::<Vec<_>>()), &chosen)?;
     let cells = chosen.iter().map(|places| places.iter().map(|place| place.cell).collect()).collect();
     Ok(Assignment { cells, cost })
 }
@@ -35,7 +35,12 @@ pub struct Assignment {
 }
 
 /// Refuses steps and footholds that no motion of the base makes possible; `path` is timed for them.
-fn ensure_walkable(model: &Model, path: &BasePath, chosen: &[Vec<Place>]) -> Result<()> {
+fn ensure_walkable(
+    model: &Model,
+    contact: &ContactGround,
+    path: &BasePath,
+    chosen: &[Vec<Place>],
+) -> Result<()> {
     let layout = &model.layout;
     for (foot, places) in chosen.iter().enumerate() {
         let name = &model.foot_names[foot];
@@ -44,7 +49,10 @@ fn ensure_walkable(model: &Model, path: &BasePath, chosen: &[Vec<Place>]) -> Res
         for (j, pair) in places.windows(2).enumerate() {
             let [a, b] = [pair[0].point, pair[1].point];
             let (length, height) = ((b - a).norm(), b.z - a.z);
-            let what = if height.abs() > highest + hopeless {
+            let over = obstacle(contact, &pair[0], &pair[1]);
+            let what = if over > highest + hopeless {
+                format!("over {over:.2} m of ground; it can take about {highest:.2} m")
+            } else if height.abs() > highest + hopeless {
                 format!("{height:.2} m in height; it can take about {highest:.2} m")
             } else if length > longest + hopeless {
                 format!("{length:.2} m; it can take about {longest:.2} m")

@@ -121,6 +121,19 @@ impl ContactGround {
         around.iter().map(|[u, v]| u8::from(!self.is_steppable([x + u, y + v]))).sum()
     }
 
+    /// The greatest height between two places, m.
+    pub fn highest_between(&self, [from, to]: [[f64; 2]; 2]) -> f64 {
+        let spacing = self.grid.spacing[0].min(self.grid.spacing[1]);
+        let steps = ((to[0] - from[0]).hypot(to[1] - from[1]) / spacing).ceil().max(1.0) as usize;
+        (0..=steps)
+            .filter_map(|n| {
+                let u = n as f64 / steps as f64;
+                self.cell_at(std::array::from_fn(|c| from[c] + u * (to[c] - from[c])))
+            })
+            .map(|cell| self.heights[cell])
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Whether there is a cell within a distance, m, on which no foot can stand.
     pub fn has_edge_within(&self, place: [f64; 2], distance: f64) -> bool {
         let around = disc(&self.grid, distance);

@@ -35,6 +35,8 @@ const BESIDE: f64 = BALL + 2.5 * ENVELOPE;
 /// The knee's margin beyond its own radius.
 const KNEE_MARGIN: f64 = 1.0;
 
+/// Cells times their neighbors for which the surfaces are made: 4096 x 4096 cells of 2 cm, half a minute.
+const MOST_WORK: f64 = 1.1e9;
 /// Standard deviation of the smoothing of the posture ground, in standing heights.
 const POSTURE: f64 = 0.35;
 /// Where less than this fraction of the cells around is steppable, a steppable cell is an outlier: a wall's top, a pole.
@@ -97,6 +99,8 @@ impl Surfaces {
             slope: contact.max_slope.unwrap_or(f64::INFINITY).min(SLOPE * contact.friction),
             patch: PATCH * half_size,
         };
+        let deviation = POSTURE * robot.standing_height();
+        ensure_coarse(grid, deviation.max(needs.beside))?;
         let contact = ContactGround::new(grid, heights, needs);
         // Averaged, but nowhere below what the body itself rolls over: at the top of an edge, an average is.
         let envelope = |radius: f64, least: f64| {
@@ -106,7 +110,7 @@ impl Surfaces {
         };
         let knee = robot.knee_radius();
         Ok(Self {
-            posture: surface(&posture(&contact, heights, POSTURE * robot.standing_height())?)?,
+            posture: surface(&posture(&contact, heights, deviation)?)?,
             feet: envelope(BALL * foot, LEAST_BALL * foot)?,
             knees: envelope(knee + KNEE_MARGIN * foot, knee + 0.5 * KNEE_MARGIN * foot)?,
             contact: Some(Arc::new(contact)),
@@ -117,6 +121,23 @@ impl Surfaces {
     pub fn have_edges(&self) -> bool {
         self.contact.is_some()
     }
+}
+
+/// Refuses rasters whose cells are so fine, or so many, that the surfaces would take minutes.
+fn ensure_coarse(grid: &Grid, reach: f64) -> Result<()> {
+    let [x, y] = grid.spacing;
+    let work = grid.len() as f64 * reach * reach / (x * y);
+    if work <= MOST_WORK {
+        return Ok(());
+    }
+    let fine = x.min(y);
+    let what = format!(
+        "{} x {} cells of {fine} m are too fine for contact.footholds = \"patches\"; use a part of them (terrain.extent), or cells of {:.3} m",
+        grid.columns,
+        grid.rows,
+        fine * (work / MOST_WORK).powf(0.25)
+    );
+    Err(crate::Error::key("terrain.spacing", what))
 }
 
 /// The ground on which the robot stands on average: what cannot be stood on is filled by a membrane, then all is smoothed.

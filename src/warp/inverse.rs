@@ -22,10 +22,11 @@ impl WarpMap {
     /// # Errors
     /// If p is not finite or is further from the box than its longest edge, or if no such x̄ is found.
     pub fn inverse(&self, p: [f64; 3]) -> Result<[f64; 3]> {
-        self.check_near(&p)?;
-        // The guess has the same x, y and the same height above the ground.
+        self.check_near(&[p[0], p[1]])?;
+        // The guess has the same x, y and the same height above the ground, which can be anywhere.
         let ground = self.position([p[0], p[1], 0.0])[2];
         let guess = Vector3::new(p[0], p[1], p[2] - ground);
+        self.check_near(&guess.into())?;
         let step = |x: &Vector3<f64>, target: &Vector3<f64>| {
             let jet = self.jet((*x).into(), Order::First);
             let residual = Vector3::from(jet.position) - target;
