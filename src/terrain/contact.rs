@@ -92,11 +92,6 @@ impl ContactGround {
         &self.steppable
     }
 
-    /// Height of the plane at a cell, and its slope along x and y.
-    pub fn plane(&self, cell: usize) -> [f64; 3] {
-        self.planes[cell]
-    }
-
     /// x, y of a cell, and the height of its plane there, m.
     pub fn point(&self, cell: usize) -> [f64; 3] {
         let (column, row) = (cell % self.grid.columns, cell / self.grid.columns);
@@ -310,7 +305,7 @@ mod tests {
         assert!(!ground(|x, _| 0.65 * x).is_steppable([0.0, 0.0]));
         let slope = ground(|x, y| 0.5 * x - 0.2 * y);
         assert!(slope.is_steppable([0.0, 0.0]));
-        let plane = slope.plane(slope.cell_at([0.2, 0.1]).expect("a cell"));
+        let plane = slope.planes[slope.cell_at([0.2, 0.1]).expect("a cell")];
         assert!((plane[0] - 0.08).abs() < 1e-12 && (plane[1] - 0.5).abs() < 1e-12);
         assert!(!ground(|x, _| 0.02 * (70.0 * x).sin()).is_steppable([0.0, 0.0]));
     }

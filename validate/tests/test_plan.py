@@ -81,6 +81,21 @@ def test_a_damaged_plan_is_refused(standing_plan: Path, tmp_path: Path, change: 
         assert word in str(caught.value)
 
 
+def corners(change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
+    """Patches for two stances of each foot, the second of the last one missing, changed."""
+    patches = np.zeros((4, 2, 4, 3)) + np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    patches[3, 1] = np.nan
+    return lambda a: a.__setitem__("patch_corners", change(patches))
+
+
+def test_patches_are_four_corners_each(standing_plan: Path, tmp_path: Path) -> None:
+    assert read_plan(altered(standing_plan, tmp_path / "good.plan.npz", corners(lambda p: p))).terrain_raw is None
+    for change in (with_nan, lambda p: p[..., :2], lambda p: p.astype(np.float32), lambda p: p[:, ::-1], lambda p: p[:, :0]):
+        plan = altered(standing_plan, tmp_path / "bad.plan.npz", corners(change))
+        with pytest.raises(InputError, match="patch_corners"):
+            read_plan(plan)
+
+
 def test_files_that_are_not_plans_are_refused(standing_plan: Path, tmp_path: Path) -> None:
     whole = standing_plan.read_bytes()
     for name, content, words in (

@@ -265,6 +265,21 @@ def _pull_limit(check: _Checker, meta: dict[str, Any], adhesive: Bools) -> float
     return float(limit)
 
 
+def _check_patches(check: _Checker) -> None:
+    """Refuse corners that are not numbers, or padding before the end of a foot's stances."""
+    corners = check.shaped("patch_corners", ("E", "S", 4, 3))
+    if corners.dtype != np.float64:
+        raise check.fail("patch_corners", f"has type {corners.dtype}, expected float64")
+    if corners.shape[1] == 0:
+        raise check.fail("patch_corners", "has no stance")
+    padding = np.isnan(corners).all(axis=(2, 3))  # (E, S)
+    bad = ~np.isfinite(corners).all(axis=(2, 3)) & ~padding
+    bad[:, 1:] |= padding[:, :-1] & ~padding[:, 1:]
+    bad[:, :1] |= padding[:, :1]
+    if bad.any():
+        raise check.fail("patch_corners", f"is not four corners at {np.argwhere(bad)[0].tolist()}")
+
+
 def read_plan(path: str | Path) -> Plan:
     """Read a plan file; raises `InputError` with file, member and reason if it cannot be used."""
     path = Path(path)
@@ -289,8 +304,9 @@ def read_plan(path: str | Path) -> Plan:
     if min(heights.shape) < 2 or (spacing <= 0).any():
         raise check.fail("heightfield", "needs two rows, two columns and positive spacing")
     raw = check.floats("heightfield_raw", ("R", "C")) if "heightfield_raw" in check.arrays else None
-    if raw is not None and "patch_corners" in check.arrays:  # planned for the raw ground
-        heights, raw = raw, None
+    if "patch_corners" in check.arrays:  # planned for the raw ground
+        _check_patches(check)
+        heights, raw = heights if raw is None else raw, None
 
     solver = meta.get("solver")
     return Plan(
