@@ -84,6 +84,7 @@ fn a_plan_with_patches_survives_its_file_and_every_lie_about_them_is_noticed() {
     // Nothing is known about a point: its normal is not a number, and no law may hold because of that.
     has(spoiled(&|plan| plan.patches.iter_mut().flatten().for_each(|p| *p = [p[0]; 4])), "stance_gap");
     has(spoiled(&|plan| plan.ground.height.iter_mut().for_each(|h| *h += 0.03)), "patch_roughness");
+    has(spoiled(&|plan| plan.ground.height.iter_mut().for_each(|h| *h += 0.012)), "patch_offset");
     // A wall in the way of the swings, between the footholds.
     let wall = |plan: &mut Plan| {
         let ground = &mut plan.ground;

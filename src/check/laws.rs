@@ -62,6 +62,8 @@ laws! {
     PATCH_COUNT = "patch_count", "1", Some(0.0), None, "every stance has a patch";
     PATCH_ROUGHNESS = "patch_roughness", "mm", Some(15.0), None,
         "difference of the raw ground under a standing foot from the plane of its patch";
+    PATCH_OFFSET = "patch_offset", "mm", Some(8.0), None,
+        "mean difference of the raw ground under a standing foot from the plane of its patch";
     SWING_EDGE = "swing_edge", "mm", Some(0.1), None,
         "a swinging foot, as a ball, stays above raw ground with edges, or is no deeper in it than next to it, where it stands \
          (allowance for rounding: 0.1 mm)";

@@ -59,7 +59,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     if !s.has_edges() {
         return;
     }
-    let [mut outside, mut raw, mut missing, mut cut] = [Worst::default(); 4];
+    let [mut outside, mut raw, mut offset, mut missing, mut cut] = [Worst::default(); 5];
     for e in 0..s.feet {
         let stances = stance_numbers(s, e);
         let needed = stances[s.samples - 1] + usize::from(s.in_contact(s.samples - 1, e));
@@ -71,7 +71,9 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
                 outside.meet(1e3 * patch.beyond(x, y), n, Some(e));
                 // A standing foot does not move: once for each stance is enough.
                 if before != Some(stances[n]) {
-                    raw.meet(1e3 * roughness(s, &patch, [x, y]), n, Some(e));
+                    let [largest, mean] = differences(s, &patch, [x, y]);
+                    raw.meet(1e3 * largest, n, Some(e));
+                    offset.meet(1e3 * mean.abs(), n, Some(e));
                     before = Some(stances[n]);
                 }
             }
@@ -83,6 +85,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     findings.push((laws::PATCH_COUNT, missing));
     findings.push((laws::PATCH, outside));
     findings.push((laws::PATCH_ROUGHNESS, raw));
+    findings.push((laws::PATCH_OFFSET, offset));
     findings.push((laws::SWING_EDGE, cut));
 }
 
@@ -95,11 +98,17 @@ fn under_foot(radius: f64) -> impl Iterator<Item = [f64; 2]> {
         .filter(move |d| d[0].hypot(d[1]) <= radius)
 }
 
-/// Largest difference of the raw ground under a foot from the plane of its patch, m.
-fn roughness(s: &Subject, patch: &PlanPatch, [x, y]: [f64; 2]) -> f64 {
-    under_foot(s.plan.meta.robot.foot_radius)
-        .map(|[u, v]| (s.ground.height(x + u, y + v) - patch.height(x + u, y + v)).abs())
-        .fold(0.0, f64::max)
+/// Largest and mean difference of the raw ground under a foot from the plane of its patch, m.
+fn differences(s: &Subject, patch: &PlanPatch, [x, y]: [f64; 2]) -> [f64; 2] {
+    let (mut largest, mut sum, mut count) = (0.0_f64, 0.0, 0.0);
+    for [u, v] in under_foot(s.plan.meta.robot.foot_radius) {
+        let above = s.ground.height(x + u, y + v) - patch.height(x + u, y + v);
+        largest = largest.max(above.abs());
+        sum += above;
+        count += 1.0;
+    }
+    // The sum is not a number if any difference is not; `max` would hide it.
+    [if f64::is_nan(sum) { sum } else { largest }, sum / count]
 }
 
 /// How deep a foot, as a ball that touches its contact point, is in the raw ground, m.
@@ -127,14 +136,21 @@ fn swing_depths(s: &Subject, e: usize) -> Vec<(usize, f64)> {
         while n < s.samples && !s.in_contact(n, e) {
             n += 1;
         }
-        if first > 0 && n > first && n < s.samples {
-            let ends = [first - 1, n].map(|n| (contact(n), depth(s, contact(n), normal(n)).max(0.0)));
+        // A swing at the very beginning or end of the plan has a foothold on one side only.
+        let stands = |n: &usize| *n < s.samples && s.in_contact(*n, e);
+        let ends = [first.wrapping_sub(1), n].map(|n| Some(n).filter(stands));
+        if n > first {
+            let up = [0.0, 0.0, 1.0];
+            let from = ends[0].or(ends[1]).map_or(up, normal);
+            let to = ends[1].or(ends[0]).map_or(up, normal);
+            let pressed = |n| (contact(n), depth(s, contact(n), normal(n)).max(0.0));
+            let footholds: Vec<_> = ends.into_iter().flatten().map(pressed).collect();
             for k in first..n {
                 // The center turns evenly from one normal to the next.
                 let u = (k + 1 - first) as f64 / (n + 1 - first) as f64;
-                let turned = add(scale(1.0 - u, normal(first - 1)), scale(u, normal(n)));
+                let turned = add(scale(1.0 - u, from), scale(u, to));
                 let direction = scale(1.0 / dot(turned, turned).sqrt(), turned);
-                let stood = ends
+                let stood = footholds
                     .iter()
                     .filter(|(foothold, _)| norm(sub(contact(k), *foothold)) <= radius)
                     .map(|(_, depth)| *depth)

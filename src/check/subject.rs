@@ -51,6 +51,12 @@ impl<'a> Subject<'a> {
                 "meta.robot: mass times gravity is {weight} N, expected more than 0"
             )));
         }
+        let radius = plan.meta.robot.foot_radius;
+        if !plan.patches.is_empty() && !(radius.is_finite() && radius > 0.0) {
+            return Err(Error::input(format!(
+                "meta.robot: foot_radius is {radius} m, expected more than 0, for the patches"
+            )));
+        }
         let samples = plan.t.len();
         let step = (plan.t[samples - 1] - plan.t[0]) / (samples - 1) as f64;
         let even = plan.t.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= 1e-6 * step);

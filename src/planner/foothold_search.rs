@@ -100,6 +100,10 @@ pub struct Search<'a> {
     way: Vec<Pose>,
     first: f64,
     apart: f64,
+    /// A horizontal unit vector across the way.
+    sideways: [f64; 2],
+    /// By foot, the longest and the highest step, m.
+    largest_steps: Vec<[f64; 2]>,
     /// By foot, for each pose of the way.
     tracks: Vec<Vec<Option<Place>>>,
     history: Vec<Touchdown>,
@@ -117,7 +121,18 @@ impl<'a> Search<'a> {
         let numbers = 0..=(count + 2.0 * beyond) as usize;
         let way = numbers.map(|n| path.pose_on_way((n as f64 - beyond) / count)).collect();
         let first = -beyond * apart;
-        let mut search = Self { model, contact, path, way, first, apart, tracks: vec![], history: vec![] };
+        let mut search = Self {
+            model,
+            contact,
+            path,
+            way,
+            first,
+            apart,
+            sideways: path.sideways(),
+            largest_steps: (0..model.feet()).map(|foot| largest_step(model, path, foot)).collect(),
+            tracks: vec![],
+            history: vec![],
+        };
         search.tracks = (0..model.feet())
             .map(|foot| (0..search.way.len()).map(|n| search.place(foot, n)).collect())
             .collect();
@@ -129,7 +144,7 @@ impl<'a> Search<'a> {
         let s = self.first + n as f64 * self.apart;
         let (pose, reach) = (&self.way[n], &self.model.reach[foot]);
         let nominal = pose.position + pose.rotation * self.model.nominal[foot];
-        let side = self.path.sideways();
+        let side = self.sideways;
         let spacing = self.contact.grid().spacing[0].min(self.contact.grid().spacing[1]);
         let steps = (WINDOW * reach.half_size[1] / spacing) as i64;
         (-steps..=steps)
@@ -311,7 +326,7 @@ impl<'a> Search<'a> {
     /// What a step is longer and higher than the leg can take, m.
     fn excess(&self, foot: usize, from: &Place, to: &Place) -> f64 {
         let step = to.point - from.point;
-        let [longest, highest] = largest_step(self.model, self.path, foot);
+        let [longest, highest] = self.largest_steps[foot];
         let rise = step.z.abs().max(obstacle(self.contact, from, to));
         (step.norm() - longest).max(0.0) + (rise - highest).max(0.0)
     }

@@ -15,7 +15,7 @@
 const ACCELERATION: f64 = 4e-4;
 /// w_n.
 const NOMINAL: f64 = 2e-4;
-/// Limit on the Newton steps; the active corridors settle in 5 to 15.
+/// Limit on the Newton steps; the active corridors stop changing after 5 to 15.
 const STEPS: usize = 30;
 
 /// Where the base can be during a stance.

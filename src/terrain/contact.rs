@@ -47,6 +47,8 @@ pub struct ContactGround {
     /// Height, and slope along x and y, of the plane that fits best around each cell.
     planes: Vec<[f64; 3]>,
     steppable: Vec<bool>,
+    /// From a cell to those that the ground under a foot on it depends on.
+    under_foot: Vec<Offset>,
 }
 
 impl ContactGround {
@@ -65,7 +67,8 @@ impl ContactGround {
                     });
             });
         };
-        rule_out(&under_foot(grid, needs.even), &|above| above.abs() <= needs.roughness);
+        let under_foot = under_foot(grid, needs.even);
+        rule_out(&under_foot, &|above| above.abs() <= needs.roughness);
         rule_out(&disc(grid, needs.beside), &|above| above <= RISE_BESIDE * needs.roughness);
         for ((steppable, height), filled) in
             steppable.iter_mut().zip(heights).zip(closed(grid, heights, needs.gap))
@@ -79,7 +82,7 @@ impl ContactGround {
             let inside = |at: usize, count: usize, border: usize| at >= border && at + border < count;
             *steppable &= inside(column, grid.columns, border[0]) && inside(row, grid.rows, border[1]);
         }
-        Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable }
+        Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable, under_foot }
     }
 
     /// The raster.
@@ -178,11 +181,11 @@ impl ContactGround {
 
     /// Largest difference of the ground under a foot at a cell from the cell's own plane, m.
     pub fn roughness(&self, cell: usize) -> f64 {
-        self.difference(cell, &self.plane_at(cell), &under_foot(&self.grid, self.needs.even))
+        self.difference(cell, &self.plane_at(cell))
     }
 
     /// Largest difference of the ground under a foot at a cell from a patch's plane, m.
-    fn difference(&self, cell: usize, patch: &Patch, under_foot: &[Offset]) -> f64 {
+    fn difference(&self, cell: usize, patch: &Patch) -> f64 {
         let (columns, rows) = (self.grid.columns, self.grid.rows);
         let (column, row) = (cell % columns, cell / columns);
         let difference = |&(u, v, _): &Offset| {
@@ -190,7 +193,7 @@ impl ContactGround {
             let (c, r) = (clamped(column, u, columns), clamped(row, v, rows));
             (self.heights[r * columns + c] - patch.jet(self.grid.x(c), self.grid.y(r)).h).abs()
         };
-        under_foot.iter().map(difference).fold(0.0, f64::max)
+        self.under_foot.iter().map(difference).fold(0.0, f64::max)
     }
 
     /// The plane at a cell as a patch without sides.
@@ -205,13 +208,12 @@ impl ContactGround {
         let step = self.grid.spacing[0].min(self.grid.spacing[1]);
         let most = (self.needs.patch / step) as isize;
         let axes = patch.axes();
-        let under_foot = under_foot(&self.grid, self.needs.even);
         let fits = |u: isize, v: isize| {
             let [x, y] = std::array::from_fn(|c| {
                 patch.center[c] + step * (u as f64 * axes[0][c] + v as f64 * axes[1][c])
             });
             self.cells_around([x, y]).is_some_and(|mut cells| {
-                cells.all(|cell| self.steppable[cell] && self.difference(cell, &patch, &under_foot) <= even)
+                cells.all(|cell| self.steppable[cell] && self.difference(cell, &patch) <= even)
             })
         };
         let (mut u, mut v) = ([0_isize; 2], [0_isize; 2]);

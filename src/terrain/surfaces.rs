@@ -102,7 +102,7 @@ impl Surfaces {
         let deviation = POSTURE * robot.standing_height();
         ensure_coarse(grid, deviation.max(needs.beside))?;
         let contact = ContactGround::new(grid, heights, needs);
-        // Averaged, but nowhere below what the body itself rolls over: at the top of an edge, an average is.
+        // At the top of an edge, the average lies below what the body itself rolls over.
         let envelope = |radius: f64, least: f64| {
             let averaged = averaged(grid, &rolled_over(grid, raw, radius), ENVELOPE * foot);
             let least = rolled_over(grid, raw, least);
