@@ -52,7 +52,8 @@ impl<'a> Subject<'a> {
             )));
         }
         let radius = plan.meta.robot.foot_radius;
-        if !plan.patches.is_empty() && !(radius.is_finite() && radius > 0.0) {
+        let is_length = radius.is_finite() && radius > 0.0;
+        if !(is_length || plan.patches.is_empty()) {
             return Err(Error::input(format!(
                 "meta.robot: foot_radius is {radius} m, expected more than 0, for the patches"
             )));
