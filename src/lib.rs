@@ -59,7 +59,7 @@
 //! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
 //! | [`replay`] | a report of the Python package | its verdict |
 //! | [`cli`] | arguments | exit codes |
-//! | [`files`], [`digest`] | | files written whole or not at all, `.npz` archives, SHA-256 |
+//! | [`files`], [`digest`] | | files read within bounds, and written whole or not at all; `.npz` archives, SHA-256 |
 //!
 //! # Notation
 //!
@@ -103,6 +103,7 @@ pub mod robot;
 pub mod scenario;
 pub mod terrain;
 pub mod trajectory;
+mod visible;
 pub mod warp;
 
 pub use error::{Error, Result};

@@ -18,6 +18,10 @@ const SHIPPED: &[(&str, &str)] = &[
     ("anymal_c", include_str!("../robots/anymal_c.toml")),
 ];
 
+/// Least half of an edge of a reach box, m: more than the planner's margins take off it.
+pub const LEAST_REACH: f64 = 0.02;
+/// Characters of the longest name, of a robot or a foot.
+const LONGEST_NAME: usize = 100;
 /// Radius of a foot, in standing heights, where it is not known.
 const TYPICAL_FOOT: f64 = 0.07;
 
@@ -157,6 +161,9 @@ impl Robot {
 
     fn from_document(document: &Document) -> Result<Self> {
         let robot: Self = input::read_as(document)?;
+        if !is_name(&robot.name) {
+            return Err(document.error("name", no_name(&robot.name)));
+        }
         let inertia = Matrix3::from_fn(|i, j| robot.inertia[i][j]);
         let refuse = |what: String| Err(document.error("inertia", what));
         let size = inertia.norm();
@@ -182,6 +189,16 @@ impl Robot {
                 let what = format!("given \"{}\", allowed: a name that no other foot has", foot.name);
                 return Err(document.error(&format!("{key}.name"), what));
             }
+            if !is_name(&foot.name) {
+                return Err(document.error(&format!("{key}.name"), no_name(&foot.name)));
+            }
+            if let Some(axis) = (0..3).find(|&axis| foot.reach.half_size[axis] < LEAST_REACH) {
+                let given = foot.reach.half_size[axis];
+                let what = format!(
+                    "given {given}, allowed: at least {LEAST_REACH} m; the planner keeps a margin inside the box"
+                );
+                return Err(document.error(&format!("{key}.reach.half_size[{axis}]"), what));
+            }
             if !foot.reach.contains(foot.nominal) {
                 return Err(document.error(&format!("{key}.nominal"), "lies outside the foot's reach box"));
             }
@@ -198,6 +215,18 @@ impl Robot {
         }
         Ok(robot)
     }
+}
+
+/// Whether a text can be the name of a robot or a foot. Names of robots become names of files, and must not lead to others.
+pub fn is_name(name: &str) -> bool {
+    let plain = !name.contains(|c: char| c.is_control() || matches!(c, '/' | '\\' | ':'));
+    plain && !name.is_empty() && !name.starts_with('.') && name.chars().count() <= LONGEST_NAME
+}
+
+fn no_name(given: &str) -> String {
+    format!(
+        "given {given:?}, allowed: 1 to {LONGEST_NAME} characters without /, \\ and :, and no dot at the start"
+    )
 }
 
 impl Box3 {
@@ -233,6 +262,13 @@ mod tests {
             ("[ 0.946438,", "[ -0.946438,", "all positive"),
             ("-0.000938112, 0.00595386", "0.1, 0.00595386", "symmetric"),
             ("\"RF\"", "\"LF\"", "no other foot"),
+            ("name = \"anymal_towr\"", "name = \"../anymal_c\"", "robot.toml:2: name: given \"../anymal_c\""),
+            ("name = \"LF\"", "name = \"\\u001b[2J\"", "feet[0].name: given \"\\u{1b}[2J\""),
+            (
+                "half_size = [0.15, 0.10, 0.10]",
+                "half_size = [0.15, 0.01, 0.10]",
+                "feet[0].reach.half_size[1]: given 0.01",
+            ),
             ("nominal = [0.34, 0.19, -0.42]", "nominal = [1.34, 0.19, -0.42]", "outside the foot's reach"),
             (
                 "half_size = [0.32, 0.14, 0.10]",

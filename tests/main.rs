@@ -12,6 +12,7 @@ mod durations;
 mod edges;
 mod exact;
 mod motions;
+mod outputs;
 mod plan;
 mod sheet;
 mod terrain;

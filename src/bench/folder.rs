@@ -10,7 +10,6 @@
 //!
 //! A finished case holds the SHA-256 of its scenario and of the program; when either differs, the case is computed again.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -21,8 +20,8 @@ use super::case::{Case, Work};
 use super::measured::Measured;
 use super::process::{failure, wait};
 use crate::digest::sha256_hex;
-use crate::files::write_atomically;
-use crate::replay::Tracked;
+use crate::files::{self, MAX_FILE, open_for_process, write_atomically};
+use crate::replay::{self, Tracked};
 use crate::{Error, Result};
 
 /// Digits of the program's SHA-256 that name the folder of its maps.
@@ -75,7 +74,8 @@ impl ResultsFolder {
 
     /// The result of a case that is finished; none if it is missing, damaged, or that of another scenario or program.
     pub fn kept(&self, case: &Case, any_program: bool) -> Option<Measured> {
-        let kept: KeptCase = serde_json::from_slice(&std::fs::read(self.file(case, "json")).ok()?).ok()?;
+        let kept: KeptCase =
+            serde_json::from_slice(&files::read(&self.file(case, "json"), MAX_FILE).ok()?).ok()?;
         let same = kept.key == key(case) && (any_program || kept.program == self.digest);
         same.then_some(kept.measured)
     }
@@ -112,7 +112,7 @@ impl ResultsFolder {
             .env("WARPGAIT_CACHE", &self.maps)
             .stdout(Stdio::null());
         let status = wait(command, &log, limit)?;
-        let read = std::fs::read(&result).ok().and_then(|json| serde_json::from_slice(&json).ok());
+        let read = files::read(&result, MAX_FILE).ok().and_then(|json| serde_json::from_slice(&json).ok());
         let _ = std::fs::remove_file(&result);
         match read {
             Some(measured) if status.success() => {
@@ -126,8 +126,8 @@ impl ResultsFolder {
     /// Replays the plan of a case in a process of its own, the simulation in Python.
     fn replay(&self, python: &Path, case: &Case, limit: Duration) -> std::result::Result<Tracked, String> {
         let [report, log] = ["report", "log"].map(|extension| self.file(case, extension));
-        let stdout = File::create(&report).map_err(|e| format!("failed: {}: {e}", report.display()))?;
-        let mut command = Command::new(python);
+        let stdout = open_for_process(&report).map_err(|e| format!("failed: {e}"))?;
+        let mut command = replay::command(python);
         command
             .args(["-m", "warpgait.validate", "--json", "--no-files", "--no-second-opinion"])
             .arg(self.plan(case))
@@ -135,7 +135,7 @@ impl ResultsFolder {
             .env("OPENBLAS_NUM_THREADS", "1")
             .stdout(stdout);
         let status = wait(command, &log, limit)?;
-        let text = std::fs::read(&report).unwrap_or_default();
+        let text = files::read(&report, MAX_FILE).unwrap_or_default();
         let _ = std::fs::remove_file(&report);
         // 0: the robot walks; 1: it does not; any other exit code comes without a verdict.
         if !matches!(status.code(), Some(0 | 1)) {

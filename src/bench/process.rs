@@ -1,11 +1,11 @@
 //! Runs the program of a case, or its replay, and kills it when it exceeds its time.
 
-use std::fs::File;
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use super::clock::processor_seconds_of;
+use crate::files::open_for_process;
 use crate::ipopt::INTERRUPT;
 
 /// How often a running process is polled.
@@ -19,7 +19,7 @@ const LEAST_ACTIVITY: f64 = 0.1;
 /// # Errors
 /// When it cannot be started, times out, or the sweep is interrupted.
 pub(super) fn wait(mut command: Command, log: &Path, limit: Duration) -> Result<ExitStatus, String> {
-    let stderr = File::create(log).map_err(|e| format!("failed: {}: {e}", log.display()))?;
+    let stderr = open_for_process(log).map_err(|e| format!("failed: {e}"))?;
     let mut child =
         command.stdin(Stdio::null()).stderr(stderr).spawn().map_err(|e| {
             format!("failed: cannot start {}: {e}", Path::new(command.get_program()).display())

@@ -8,8 +8,11 @@ use super::options::BenchOptions;
 use super::summary::{self, Group};
 use super::sweep::{self, SweepProgress};
 use super::{csv, json, pictures, protocol};
-use crate::files::write_atomically;
+use crate::files::{ensure_outputs, write_atomically};
 use crate::{Error, Result, replay};
+
+/// Files that every bench writes.
+const RESULTS: [&str; 2] = ["results.json", "results.csv"];
 
 /// The results of a bench.
 #[derive(Clone, Debug)]
@@ -33,6 +36,8 @@ pub fn run(
 ) -> Result<Option<BenchResults>> {
     let folder = options.out.join(bench.name());
     std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
+    let results = RESULTS.map(|name| folder.join(name));
+    ensure_outputs(&results.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &[])?;
     let python = if bench == Bench::Track { Some(replay::python()?) } else { None };
     let cases = protocol::cases(bench, options);
     let Some(rows) = sweep::run(cases, python, options, on_progress)? else {
@@ -40,8 +45,8 @@ pub fn run(
     };
     let groups = summary::groups(&rows);
     let mut texts = vec![
-        ("results.json".to_owned(), json::results(bench, options, &rows, &groups)?),
-        ("results.csv".to_owned(), csv::results(&rows)),
+        (RESULTS[0].to_owned(), json::results(bench, options, &rows, &groups)?),
+        (RESULTS[1].to_owned(), csv::results(&rows)),
     ];
     if bench == Bench::Track {
         texts.push(("metrics.csv".to_owned(), csv::metrics(&rows)));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::input::closest;
-use crate::{Error, Result};
+use crate::{Error, Result, files};
 
 /// One law.
 #[derive(Debug, PartialEq)]
@@ -96,7 +96,7 @@ impl CheckLimits {
     /// Reads `name = limit` from a TOML file; laws that it does not name keep their limit.
     pub fn read(mut self, path: &Path) -> Result<Self> {
         let file = path.display();
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
+        let text = files::read_text(path)?;
         let table: toml::Table =
             toml::from_str(&text).map_err(|e| Error::input(format!("{file}: not TOML: {}", e.message())))?;
         for (name, value) in table {

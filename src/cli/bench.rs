@@ -15,7 +15,9 @@ use crate::bench::protocol::{self, FORMULATIONS, LEVELS, TERRAINS};
 use crate::bench::sweep::SweepProgress;
 use crate::bench::verdict::verdict;
 use crate::bench::{self, Bench, BenchOptions, measure, tables};
+use crate::ipopt::InGoodOrder;
 use crate::robot::Robot;
+use crate::visible::visible;
 use crate::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -97,6 +99,7 @@ pub(super) fn bench(arguments: BenchArguments, console: &Console) -> Result<Endi
         )));
     }
     listen_for_ctrl_c()?;
+    let _in_good_order = InGoodOrder::begin();
     let mut progress = ProgressLine::new(console.is_quiet());
     progress.update(&title, "starting");
     let results = bench::run(bench, &options, &mut |at| progress.update(&title, &progress_text(at)))?;
@@ -107,7 +110,7 @@ pub(super) fn bench(arguments: BenchArguments, console: &Console) -> Result<Endi
     };
     console.result(&tables::table(&results.rows, &results.groups));
     for file in &results.files {
-        console.result(&format!("Written: {}", file.display()));
+        console.result(&format!("Written: {}", visible(&file.display().to_string())));
     }
     console.object(&json!({
         "bench": bench.name(),

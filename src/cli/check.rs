@@ -9,7 +9,7 @@ use super::console::Console;
 use super::ending::Ending;
 use super::figures::figures;
 use crate::check::{CheckLimits, check_with};
-use crate::files::{ensure_writable, write_atomically};
+use crate::files::{ensure_outputs, write_atomically};
 use crate::plan::Plan;
 use crate::{Result, report};
 
@@ -38,9 +38,8 @@ pub(super) struct CheckArguments {
 }
 
 pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<Ending> {
-    if let Some(plot) = &arguments.plot {
-        ensure_writable(plot)?;
-    }
+    let inputs: Vec<PathBuf> = std::iter::once(&arguments.plan).chain(&arguments.limits).cloned().collect();
+    ensure_outputs(&arguments.plot.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &inputs)?;
     let mut limits = CheckLimits::new(arguments.strict);
     if let Some(file) = &arguments.limits {
         limits = limits.read(file)?;

@@ -31,7 +31,7 @@ impl Ending {
     }
 }
 
-/// From now on Ctrl-C stops the work at its next iteration, and a second one stops the program.
+/// From now on Ctrl-C ends the program, or stops work in good order: see [`ipopt::InGoodOrder`].
 ///
 /// # Errors
 /// Internal, when the signal cannot be handled.

@@ -7,7 +7,8 @@ use serde_json::json;
 
 use super::console::Console;
 use super::ending::Ending;
-use crate::files::write_atomically;
+use crate::files::{ensure_outputs, write_atomically};
+use crate::visible::visible;
 use crate::{Error, Result, scenario};
 
 const EXAMPLES: &str = "\
@@ -36,13 +37,14 @@ pub(super) fn init(arguments: &InitArguments, console: &Console) -> Result<Endin
             PathBuf::from(name)
         }
     };
+    ensure_outputs(&[&path], &[])?;
     if path.exists() && !arguments.force {
         return Err(Error::input(format!("{}: already exists; use --force to replace it", path.display())));
     }
     let name = Path::new(path.file_name().unwrap_or_default()).with_extension("");
     write_atomically(&path, scenario::template(&name.to_string_lossy()).as_bytes())?;
     console.object(&json!({ "scenario": path }));
-    console.result(&path.display().to_string());
+    console.result(&visible(&path.display().to_string()));
     console.note(&format!("Edit it, then run: warpgait solve {}", path.display()));
     Ok(Ending::Good)
 }

@@ -9,13 +9,15 @@ use serde_json::json;
 use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
 use super::progress_line::ProgressLine;
-use crate::files::ensure_writable;
+use crate::files::ensure_outputs;
 use crate::files::npz::NpzWriter;
 use crate::heightfield::Heightfield;
-use crate::pipeline::{self, BuiltMap, Event};
+use crate::ipopt::InGoodOrder;
+use crate::pipeline::{self, BuiltMap, Event, Step};
 use crate::report::map_table;
 use crate::scenario;
 use crate::terrain::Surfaces;
+use crate::visible::visible;
 use crate::warp::{MapReport, WarpMap};
 use crate::{Error, Result, terrain};
 
@@ -44,15 +46,14 @@ pub(super) struct MapArguments {
 }
 
 pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending> {
-    if let Some(output) = &arguments.output {
-        ensure_writable(output)?;
-    }
     let loaded = scenario::load(&arguments.scenario, &arguments.set)?;
+    ensure_outputs(&arguments.output.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &loaded.files())?;
     listen_for_ctrl_c()?;
+    let mut progress = ProgressLine::new(console.is_quiet());
+    progress.show(&Event::Step(Step::Terrain));
     let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     let surfaces = Surfaces::of(&loaded.scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
     let surface = &surfaces.posture;
-    let mut progress = ProgressLine::new(console.is_quiet());
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));
     let mut show = |event: &Event| {
         progress.show(event);
@@ -64,12 +65,13 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     drop(progress);
     let BuiltMap { map, report, cached } = &built;
     if let Some(output) = &arguments.output {
+        let _in_good_order = InGoodOrder::begin();
         write(output, map, surface, report)?;
     }
     let sound = report.converged && report.inverted_points == 0;
     console.result(&map_table(report, *cached));
     if let Some(output) = &arguments.output {
-        console.result(&format!("Written: {}", output.display()));
+        console.result(&format!("Written: {}", visible(&output.display().to_string())));
     }
     console.object(&json!({
         "scenario": arguments.scenario,

@@ -2,7 +2,7 @@
 //!
 //! Messages and progress go to standard error, results to standard output; with `--json`, standard output is exactly one
 //! JSON object. Exit codes: 0 all is well; 1 a plan that is not solved or fails a check; 2 bad input or usage, nothing
-//! written; 130 interrupted.
+//! written, or standard output cannot be written; 130 interrupted. A closed standard output is no error.
 
 mod bench;
 mod check;
@@ -16,6 +16,7 @@ mod schema;
 mod solve;
 mod validate;
 
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -35,7 +36,7 @@ Examples:
   warpgait solve --help               options and examples of one command
 
 Exit codes: 0 solved and every check holds; 1 a plan that is not solved or fails a check;
-2 bad input or usage, nothing written; 130 interrupted.";
+2 bad input or usage, nothing written (or standard output is full); 130 interrupted.";
 
 #[derive(Debug, Parser)]
 #[command(name = "warpgait", version, about, after_help = EXAMPLES, arg_required_else_help = true)]
@@ -78,12 +79,19 @@ pub fn run() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are not errors; neither is a closed pipe.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { ERROR_CODE } else { Ending::Good.code() });
+            let printed = error.print().or_else(|e| match e.kind() {
+                ErrorKind::BrokenPipe => Ok(()),
+                _ => Err(e),
+            });
+            if let Err(error) = &printed {
+                eprintln!("error: standard output: {error}");
+            }
+            let good = printed.is_ok() && !error.use_stderr();
+            return ExitCode::from(if good { Ending::Good.code() } else { ERROR_CODE });
         }
     };
     let console = Console::new(arguments.json || arguments.command.has_json(), arguments.quiet);
-    match execute(arguments.command, &console) {
+    match execute(arguments.command, &console).and_then(|ending| console.finish().map(|()| ending)) {
         Ok(ending) => {
             if ending == Ending::Interrupted {
                 console.note("interrupted");

@@ -11,10 +11,12 @@ use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
 use super::figures::figures;
 use super::progress_line::ProgressLine;
-use crate::files::{ensure_writable, write_atomically};
-use crate::pipeline::{self, Planned};
+use crate::files::{ensure_outputs, write_atomically};
+use crate::ipopt::InGoodOrder;
+use crate::pipeline::{self, Event, Planned, Step};
 use crate::planner::derivatives::DerivativeError;
 use crate::scenario::{self, LoadedScenario};
+use crate::visible::visible;
 use crate::{Error, Result, report};
 
 /// Derivatives that differ from central differences by more than this are wrong.
@@ -28,7 +30,8 @@ Examples:
   warpgait solve hill.toml --set \"goal.position=[1.5, 0.0]\" --no-plot --json
 
 Exit codes: 0 solved and every check holds; 1 not solved, or a check fails, the plan is written;
-2 bad input, nothing written; 130 interrupted, the best plan so far is written.";
+2 bad input, nothing written; 130 interrupted, the best plan so far is written.
+An output never replaces an input, the other output, or anything but a regular file.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -61,29 +64,37 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     let output = output(arguments)?;
     let plot =
         (!arguments.no_plot).then(|| arguments.plot.clone().unwrap_or_else(|| beside(&output, ".svg")));
-    for file in [Some(&output), plot.as_ref()].into_iter().flatten() {
-        ensure_writable(file)?;
-    }
+    let outputs: Vec<&Path> = std::iter::once(&*output).chain(plot.as_deref()).collect();
+    ensure_outputs(&outputs, &loaded.files())?;
     listen_for_ctrl_c()?;
 
     let mut progress = ProgressLine::new(console.is_quiet());
+    let mut in_good_order = None;
     let planned = pipeline::run(&loaded, arguments.check_derivatives, &mut |event| {
+        if matches!(event, Event::Step(Step::Solve)) {
+            // From here on there is an iterate to keep.
+            in_good_order = Some(InGoodOrder::begin());
+        }
         progress.show(event);
         ControlFlow::Continue(())
     })?;
     // Interrupted before the first iterate: there is no plan to write.
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
     planned.plan.write(&output)?;
-    if let Some(plot) = &plot {
+    // The plan is written: a drawing that fails does not change that.
+    let drawn = plot.as_ref().map_or(Ok(()), |plot| {
         let drawing = report::sheet(&planned.plan, &planned.prepared.surfaces);
-        write_atomically(plot, drawing.as_bytes())?;
-    }
+        write_atomically(plot, drawing.as_bytes())
+    });
     drop(progress);
 
     let seconds = start.elapsed().as_secs_f64();
     print_tables(&planned, loaded.scenario.solver.tolerance, console);
     console.result(&summary(&planned, &output, seconds));
-    console.object(&object(&planned, &output, plot.as_deref()));
+    if let Err(error) = &drawn {
+        console.warn(&format!("error: {error}; the plan is written, without a drawing"));
+    }
+    console.object(&object(&planned, &output, plot.as_deref(), drawn.err()));
     Ok(ending(&planned))
 }
 
@@ -132,16 +143,17 @@ fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
         motion.status,
         motion.iterations,
         report::check_counts(&planned.check.rows),
-        output.display()
+        visible(&output.display().to_string())
     )
 }
 
 /// The result for `--json`.
-fn object(planned: &Planned, output: &Path, plot: Option<&Path>) -> Value {
+fn object(planned: &Planned, output: &Path, plot: Option<&Path>, no_plot: Option<Error>) -> Value {
     let Planned { prepared, map, plan, motion, check, derivatives } = planned;
     json!({
         "plan": output,
-        "plot": plot,
+        "plot": plot.filter(|_| no_plot.is_none()),
+        "plot_error": no_plot.map(|error| error.to_string()),
         "solved": motion.solved,
         "passed": check.passed,
         "interrupted": motion.interrupted,

@@ -1,12 +1,13 @@
 //! `warpgait validate`: runs the Python package, which replays the plan in MuJoCo.
 
 use std::ffi::OsString;
-use std::process::{self, ExitStatus};
+use std::process::ExitStatus;
 
 use clap::Args;
 
 use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
+use crate::ipopt::InGoodOrder;
 use crate::{Error, Result, ipopt, replay};
 
 const EXAMPLES: &str = "\
@@ -14,7 +15,9 @@ Examples:
   warpgait validate hill.plan.npz                   replay a plan and judge it
   warpgait validate hill.plan.npz --friction 0.5    on slippery ground
   warpgait validate -- --help                       all options of the Python package
+  WARPGAIT_PYTHON=.venv/bin/python warpgait validate hill.plan.npz    with a Python of your own
 
+Python is that of .venv in the program's repository, or else python3. Nothing in the working folder is run.
 Exit codes: 0 trackable; 1 not trackable; 2 bad input, or the Python package is missing; 130 interrupted.";
 
 #[derive(Debug, Args)]
@@ -34,7 +37,7 @@ impl ValidateArguments {
 
 pub(super) fn validate(arguments: &ValidateArguments, console: &Console) -> Result<Ending> {
     let python = replay::python()?;
-    let mut command = process::Command::new(&python);
+    let mut command = replay::command(&python);
     command.args(["-m", "warpgait.validate"]).args(&arguments.arguments);
     if console.is_json() && !arguments.has_json() {
         command.arg("--json");
@@ -44,6 +47,7 @@ pub(super) fn validate(arguments: &ValidateArguments, console: &Console) -> Resu
     }
     // Ctrl-C reaches Python, too, which reports it and ends. This process waits for that.
     listen_for_ctrl_c()?;
+    let _in_good_order = InGoodOrder::begin();
     ending(command.status().map_err(|e| Error::io(&python, e))?)
 }
 

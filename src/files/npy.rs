@@ -1,7 +1,16 @@
 //! One NumPy array (`.npy`, versions 1 to 3): a signature, a Python dictionary with type, order and shape, and the elements.
 
+use std::io::{ErrorKind, Read};
+
 /// The first bytes of every `.npy` file.
 pub const SIGNATURE: &[u8] = b"\x93NUMPY";
+
+/// Longer headers are refused unread, bytes.
+const MAX_HEADER: usize = 1 << 16;
+/// NumPy's arrays have no more axes.
+const MAX_AXES: usize = 64;
+/// Characters of a bad header that its error shows.
+const SHOWN: usize = 100;
 
 /// What precedes the elements.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,19 +29,36 @@ impl Header {
     /// # Errors
     /// What is wrong with the header.
     pub fn read(bytes: &[u8]) -> Result<(Self, &[u8]), String> {
-        let short = || "it ends within its header".to_owned();
-        let rest = bytes.strip_prefix(SIGNATURE).ok_or("it does not start like one")?;
-        let (&[major, _minor], rest) = rest.split_first_chunk().ok_or_else(short)?;
-        let (length, rest) = match major {
-            1 => rest.split_first_chunk().map(|(n, rest)| (u16::from_le_bytes(*n).into(), rest)),
-            2 | 3 => rest.split_first_chunk().map(|(n, rest)| (u32::from_le_bytes(*n) as usize, rest)),
-            _ => return Err(format!("version {major} of the format is not known")),
+        let mut rest = bytes;
+        let header = Self::read_from(&mut rest)?;
+        Ok((header, rest))
+    }
+
+    /// Reads a header; the elements follow. Its length is bounded, and the time it takes is proportional to its length.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read_from(file: &mut impl Read) -> Result<Self, String> {
+        let mut start = [0; SIGNATURE.len() + 2];
+        fill(file, &mut start)?;
+        let [signature @ .., major, _minor] = &start;
+        if signature != SIGNATURE {
+            return Err("it does not start like one".into());
         }
-        .ok_or_else(short)?;
-        let (text, elements) = rest.split_at_checked(length).ok_or_else(short)?;
+        let mut length = [0; 4];
+        fill(file, &mut length[..if *major == 1 { 2 } else { 4 }])?;
+        if !(1..=3).contains(major) {
+            return Err(format!("version {major} of the format is not known"));
+        }
+        let length = u32::from_le_bytes(length) as usize;
+        if length > MAX_HEADER {
+            return Err(format!("a header of {length} bytes; at most {MAX_HEADER} are read"));
+        }
+        let mut text = vec![0; length];
+        fill(file, &mut text)?;
         // Version 1 is Latin-1, which differs from UTF-8 only in the names of a record's fields.
-        let text = String::from_utf8_lossy(text);
-        Ok((parse(&text).ok_or_else(|| format!("its header is {}", text.trim()))?, elements))
+        let text = String::from_utf8_lossy(&text);
+        parse(&text).ok_or_else(|| format!("its header is {}", cut(text.trim())))
     }
 
     /// The bytes before the elements: version 1, padded as NumPy does it.
@@ -99,6 +125,21 @@ pub fn numbers(dtype: &str, elements: &[u8]) -> Option<Vec<f64>> {
     })
 }
 
+/// Reads as many bytes as fit.
+fn fill(file: &mut impl Read, bytes: &mut [u8]) -> Result<(), String> {
+    file.read_exact(bytes).map_err(|e| match e.kind() {
+        ErrorKind::UnexpectedEof => "it ends within its header".to_owned(),
+        _ => e.to_string(),
+    })
+}
+
+fn cut(text: &str) -> String {
+    if text.chars().nth(SHOWN).is_none() {
+        return text.to_owned();
+    }
+    text.chars().take(SHOWN).chain(['…']).collect()
+}
+
 /// The dictionary of a header: three keys in any order, and nothing after it but space.
 fn parse(text: &str) -> Option<Header> {
     let (mut dtype, mut fortran_order, mut shape) = (None, None, None);
@@ -151,7 +192,11 @@ fn parse_shape(value: &str) -> Option<Vec<u64>> {
     let list = value.strip_prefix('(')?.strip_suffix(')')?.trim();
     // `(3)` is no tuple.
     let list = list.strip_suffix(',').or((list.is_empty() || list.contains(',')).then_some(list))?;
-    if list.is_empty() { Some(Vec::new()) } else { list.split(',').map(|n| n.trim().parse().ok()).collect() }
+    if list.is_empty() {
+        return Some(Vec::new());
+    }
+    let axes: Vec<u64> = list.split(',').map(|n| n.trim().parse().ok()).collect::<Option<_>>()?;
+    (axes.len() <= MAX_AXES).then_some(axes)
 }
 
 #[cfg(test)]
@@ -222,5 +267,7 @@ mod tests {
             assert_eq!((header.shape, numbers(&header.dtype, elements)), (vec![1], Some(vec![1.0])));
         }
         assert!(Header::read(&[SIGNATURE, &[4, 0, 0, 0, 0, 0]].concat()).unwrap_err().contains("version 4"));
+        let long = [SIGNATURE, &[2, 0], &[255; 4], &[b' '; 100]].concat();
+        assert!(Header::read(&long).unwrap_err().contains("at most 65536"));
     }
 }

@@ -1,7 +1,6 @@
 //! Archives of NumPy arrays (`.npz`): deflated zip files of `.npy` members that `numpy.load` reads.
 
-use std::fs::File;
-use std::io::{BufWriter, Cursor, Read, Write};
+use std::io::{BufWriter, Cursor, ErrorKind, Read, Write};
 use std::iter::repeat;
 use std::path::{Path, PathBuf};
 
@@ -10,23 +9,30 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::npy::{self, Header};
-use super::temporary_beside;
+use super::output::Pending;
 use crate::{Error, Result};
 
-/// Writes an archive to a temporary file beside its target; [`NpzWriter::finish`] renames it, so that a killed process
-/// never leaves half a file under the target's name.
+/// All members that are read may take this many bytes: two grounds of 4096 x 4096 heights, and as much again.
+const MAX_UNPACKED: usize = 512 << 20;
+/// The longest string of an array may take this many bytes, 4 for each character.
+const MAX_STRING: usize = 16 << 20;
+/// Bytes that are unpacked at a time.
+const BLOCK: usize = 1 << 16;
+
+/// Writes an archive under a temporary name; [`NpzWriter::finish`] gives it that of its target.
 pub struct NpzWriter {
-    zip: Option<ZipWriter<BufWriter<File>>>,
-    temporary: PathBuf,
+    zip: ZipWriter<BufWriter<Pending>>,
     target: PathBuf,
 }
 
 impl NpzWriter {
     /// Opens the temporary file.
+    ///
+    /// # Errors
+    /// For targets that must not be replaced or cannot be written.
     pub fn create(target: &Path) -> Result<Self> {
-        let temporary = temporary_beside(target)?;
-        let file = File::create(&temporary).map_err(|e| Error::io(target, e))?;
-        Ok(Self { zip: Some(ZipWriter::new(BufWriter::new(file))), temporary, target: target.to_path_buf() })
+        let zip = ZipWriter::new(BufWriter::new(Pending::create(target)?));
+        Ok(Self { zip, target: target.to_path_buf() })
     }
 
     /// Adds a float64 array; `values` in C order, as many as the shape requires.
@@ -86,29 +92,20 @@ impl NpzWriter {
         let header = Header { dtype: dtype.into(), fortran_order: false, shape };
         let header = header.write().map_err(|e| Error::Internal(format!("{name}: {e}")))?;
         let at = |e: std::io::Error| Error::io(&self.target, e);
-        let zip = self.zip.as_mut().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
-        zip.start_file(format!("{name}.npy"), options).map_err(|e| at(e.into()))?;
-        zip.write_all(&header).and_then(|()| zip.write_all(&bytes)).map_err(at)
+        self.zip.start_file(format!("{name}.npy"), options).map_err(|e| at(e.into()))?;
+        self.zip.write_all(&header).and_then(|()| self.zip.write_all(&bytes)).map_err(at)
     }
 
-    /// Closes the archive and renames it to its target.
-    pub fn finish(mut self) -> Result<()> {
-        let at = |e: std::io::Error| Error::io(&self.target, e);
-        let zip = self.zip.take().ok_or_else(|| Error::Internal("the archive is closed".into()))?;
+    /// Closes the archive and gives it the name of its target.
+    ///
+    /// # Errors
+    /// When it cannot be written; what was there then stays.
+    pub fn finish(self) -> Result<()> {
+        let Self { zip, target } = self;
+        let at = |e: std::io::Error| Error::io(&target, e);
         let buffer = zip.finish().map_err(|e| at(e.into()))?;
-        let file = buffer.into_inner().map_err(|e| at(e.into_error()))?;
-        file.sync_all().map_err(at)?;
-        drop(file);
-        std::fs::rename(&self.temporary, &self.target).map_err(at)
-    }
-}
-
-impl Drop for NpzWriter {
-    fn drop(&mut self) {
-        // After `finish` this file no longer exists; before it, a failed write must not leave one.
-        drop(self.zip.take());
-        let _ = std::fs::remove_file(&self.temporary);
+        buffer.into_inner().map_err(|e| at(e.into_error()))?.commit()
     }
 }
 
@@ -116,16 +113,21 @@ impl Drop for NpzWriter {
 pub struct NpzReader {
     zip: ZipArchive<Cursor<Vec<u8>>>,
     file: String,
+    /// Bytes of elements that may still be unpacked.
+    left: usize,
 }
 
 impl NpzReader {
     /// Reads the file into memory and finds its members.
+    ///
+    /// # Errors
+    /// For files that cannot be read, are too large, or are no archives.
     pub fn open(path: &Path) -> Result<Self> {
         let file = path.display().to_string();
-        let content = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+        let content = super::read(path, super::MAX_FILE)?;
         let zip = ZipArchive::new(Cursor::new(content))
             .map_err(|e| Error::input(format!("{file}: not an .npz archive, or truncated: {e}")))?;
-        Ok(Self { zip, file })
+        Ok(Self { zip, file, left: MAX_UNPACKED })
     }
 
     /// Whether there is such a member.
@@ -143,7 +145,7 @@ impl NpzReader {
 
     /// An input error at a member.
     pub fn error(&self, member: &str, what: impl std::fmt::Display) -> Error {
-        Error::input(format!("{}: member `{member}`: {what}", self.file))
+        at_member(&self.file, member, &what)
     }
 
     /// A float64 array with its shape; NaN and infinities are allowed.
@@ -205,7 +207,8 @@ impl NpzReader {
         Err(self.error(name, format!("shape {}, expected {}", tuple(found), tuple(expected))))
     }
 
-    /// Reads a member whose elements take as many bytes as `width` tells from the dtype, if it is the right one.
+    /// Reads a member whose elements take as many bytes as `width` tells from the dtype, if it is the right one. What the member says
+    /// about its size is judged before anything is allocated for it.
     fn read<T>(
         &mut self,
         name: &str,
@@ -213,34 +216,52 @@ impl NpzReader {
         width: impl Fn(&str) -> Option<usize>,
         element: impl Fn(&[u8]) -> Option<T>,
     ) -> Result<(Vec<usize>, Vec<T>)> {
-        let member = self.zip.by_name(&format!("{name}.npy")).and_then(|mut member| {
-            let mut content = Vec::new();
-            member.read_to_end(&mut content)?;
-            Ok(content)
-        });
-        let content = match member {
-            Ok(content) => content,
-            Err(ZipError::FileNotFound) => return Err(self.error(name, "missing")),
-            Err(e) => return Err(self.error(name, format!("damaged or truncated: {e}"))),
-        };
-        let (header, data) =
-            Header::read(&content).map_err(|e| self.error(name, format!("not a .npy array: {e}")))?;
+        let (file, left) = (&self.file, self.left);
+        let error = |what: &dyn std::fmt::Display| at_member(file, name, what);
+        let mut member = self.zip.by_name(&format!("{name}.npy")).map_err(|e| match e {
+            ZipError::FileNotFound => error(&"missing"),
+            e => error(&format!("damaged or truncated: {e}")),
+        })?;
+        let header = Header::read_from(&mut member).map_err(|e| error(&format!("not a .npy array: {e}")))?;
         let Header { dtype, fortran_order, shape } = &header;
         let Some(width) = width(dtype) else {
-            return Err(self.error(name, format!("dtype {dtype}, expected {wanted}")));
+            return Err(error(&format!("dtype {dtype}, expected {wanted}")));
         };
         if *fortran_order && shape.len() > 1 {
-            return Err(self.error(name, "stored in Fortran order, expected C order"));
+            return Err(error(&"stored in Fortran order, expected C order"));
         }
-        // The size must fit before anything is allocated for it.
-        if header.num_bytes(width) != Some(data.len()) {
-            let (bytes, shape) = (data.len(), npy::tuple(shape));
-            return Err(self.error(name, format!("{bytes} bytes of data do not make {shape} of {dtype}")));
+        let (array, limit) = (format!("{} of {dtype}", npy::tuple(shape)), MAX_UNPACKED >> 20);
+        let Some(bytes) = header.num_bytes(width).filter(|&bytes| bytes <= left && width <= MAX_STRING)
+        else {
+            return Err(error(&format!("{array} is too large; all members together may take {limit} MiB")));
+        };
+        let mut block = vec![0; bytes.min(width * (BLOCK / width).max(1))];
+        let (mut values, mut to_read) = (Vec::new(), bytes);
+        while to_read > 0 {
+            let part = to_read.min(block.len());
+            let part = &mut block[..part];
+            member.read_exact(part).map_err(|e| match e.kind() {
+                ErrorKind::UnexpectedEof => error(&format!("fewer bytes of data than {array} takes")),
+                _ => error(&format!("damaged or truncated: {e}")),
+            })?;
+            to_read -= part.len();
+            for bytes in part.chunks_exact(width) {
+                values.push(element(bytes).ok_or_else(|| error(&format!("an element is no {wanted}")))?);
+            }
         }
-        let values: Option<Vec<T>> = data.chunks_exact(width).map(element).collect();
-        let values = values.ok_or_else(|| self.error(name, format!("an element is no {wanted}")))?;
+        // At the end, the checksum is compared.
+        match member.read(&mut [0]) {
+            Ok(0) => {}
+            Ok(_) => return Err(error(&format!("more bytes of data than {array} takes"))),
+            Err(e) => return Err(error(&format!("damaged or truncated: {e}"))),
+        }
+        self.left -= bytes;
         Ok((shape.iter().map(|&n| n as usize).collect(), values))
     }
+}
+
+fn at_member(file: &str, member: &str, what: &dyn std::fmt::Display) -> Error {
+    Error::input(format!("{file}: member `{member}`: {what}"))
 }
 
 /// The index of a flat position, as NumPy writes it.

@@ -1,6 +1,6 @@
 //! A TOML file with the line of every key, so that errors can point at it.
 
-use std::collections::BTreeMap;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
 
@@ -9,15 +9,25 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::words::show;
-use crate::{Error, Result};
+use crate::{Error, Result, files};
+
+/// Parts of the key of an override; no key of a scenario has as many.
+const MOST_PARTS: usize = 16;
 
 /// A parsed file, possibly with values overridden from the command line.
 #[derive(Clone, Debug)]
 pub struct Document {
     file: String,
     table: Table,
-    /// Where each value was set, by dotted key (`gait.duty`, `gait.phases[1]`).
-    origins: BTreeMap<String, Origin>,
+    origins: Origins,
+}
+
+/// Where a value was set, and the values in it: of tables by key, of arrays by `[index]`. A tree, because full names of all values can be
+/// much longer than the file.
+#[derive(Clone, Debug, Default)]
+struct Origins {
+    here: Option<Origin>,
+    within: Vec<(String, Origins)>,
 }
 
 #[derive(Clone, Debug)]
@@ -34,9 +44,7 @@ impl Document {
     /// If it cannot be read, is not UTF-8, or is not TOML.
     pub fn read(path: &Path) -> Result<(Self, String)> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-        let text = String::from_utf8(bytes)
-            .map_err(|_| Error::input(format!("{file}: not a text file in UTF-8")))?;
+        let text = files::read_text(path)?;
         Ok((Self::parse(&file, &text)?, text))
     }
 
@@ -53,8 +61,7 @@ impl Document {
             Error::input(format!("{file}{at}: not TOML: {}: `{shown}`", error.message().replace('\n', "; ")))
         };
         let spanned = DeTable::parse(text).map_err(malformed)?;
-        let mut origins = BTreeMap::new();
-        note_lines(spanned.get_ref(), "", &line, &mut origins);
+        let origins = Origins::of_table(None, spanned.get_ref(), &line);
         let table = toml::from_str(text).map_err(malformed)?;
         Ok(Self { file: file.to_owned(), table, origins })
     }
@@ -72,6 +79,9 @@ impl Document {
         let parts: Vec<&str> = key.split('.').collect();
         if parts.iter().any(|part| part.is_empty()) {
             return refuse("the key has an empty part; expected for instance gait.kind=trot".into());
+        }
+        if parts.len() > MOST_PARTS {
+            return refuse(format!("the key has {} parts; at most {MOST_PARTS} are allowed", parts.len()));
         }
         let value = match toml::from_str::<Table>(&format!("value = {value}\n")) {
             Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),
@@ -92,9 +102,11 @@ impl Document {
             };
         }
         table.insert((*last).to_owned(), value);
-        self.origins
-            .retain(|known, _| !(known.starts_with(key) && known[key.len()..].starts_with(['.', '['])));
-        self.origins.insert(key.to_owned(), Origin::Override(assignment.to_owned()));
+        let mut origins = &mut self.origins;
+        for part in parts {
+            origins = origins.entry(part);
+        }
+        *origins = Origins { here: Some(Origin::Override(assignment.to_owned())), within: Vec::new() };
         Ok(())
     }
 
@@ -117,14 +129,15 @@ impl Document {
 
     /// An input error at a key, with file and line; for a missing key, the line of the table that lacks it.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
-        let mut known = key;
-        let origin = loop {
-            match (self.origins.get(known), known.rfind(['.', '['])) {
-                (Some(origin), _) => break Some(origin),
-                (None, Some(dot)) => known = &known[..dot],
-                (None, None) => break None,
-            }
-        };
+        let (mut origins, mut origin, mut rest) = (&self.origins, None, key);
+        while !rest.is_empty() {
+            // A key in quotes may itself have dots.
+            let part = if origins.get(rest).is_some() { rest } else { first_part(rest) };
+            let Some(inner) = origins.get(part) else { break };
+            origins = inner;
+            origin = inner.here.as_ref().or(origin);
+            rest = rest[part.len()..].trim_start_matches('.');
+        }
         let at = match origin {
             Some(Origin::Line(line)) => format!("{}:{line}", self.file),
             Some(Origin::Override(assignment)) => format!("--set {assignment}"),
@@ -134,36 +147,47 @@ impl Document {
     }
 }
 
-fn note_lines(
-    table: &DeTable,
-    prefix: &str,
-    line: &dyn Fn(&Range<usize>) -> usize,
-    origins: &mut BTreeMap<String, Origin>,
-) {
-    for (key, value) in table {
-        let path = join(prefix, key.get_ref());
-        origins.insert(path.clone(), Origin::Line(line(&key.span())));
-        note_value(value, &path, line, origins);
+impl Origins {
+    fn get(&self, part: &str) -> Option<&Self> {
+        self.within.iter().find(|(name, _)| name == part).map(|(_, inner)| inner)
+    }
+
+    fn entry(&mut self, part: &str) -> &mut Self {
+        let known = self.within.iter().position(|(name, _)| name == part);
+        let at = known.unwrap_or_else(|| {
+            self.within.push((part.to_owned(), Self::default()));
+            self.within.len() - 1
+        });
+        &mut self.within[at].1
+    }
+
+    fn of_table(here: Option<Origin>, table: &DeTable, line: &dyn Fn(&Range<usize>) -> usize) -> Self {
+        let origin = |(key, value): (&Spanned<Cow<str>>, &Spanned<DeValue>)| {
+            (key.get_ref().clone().into_owned(), Self::of_value(line(&key.span()), value, line))
+        };
+        Self { here, within: table.iter().map(origin).collect() }
+    }
+
+    fn of_value(at: usize, value: &Spanned<DeValue>, line: &dyn Fn(&Range<usize>) -> usize) -> Self {
+        let here = Some(Origin::Line(at));
+        let within = match value.get_ref() {
+            DeValue::Table(inner) => return Self::of_table(here, inner, line),
+            DeValue::Array(items) => {
+                let origin = |(i, item): (usize, &Spanned<_>)| {
+                    (format!("[{i}]"), Self::of_value(line(&item.span()), item, line))
+                };
+                items.iter().enumerate().map(origin).collect()
+            }
+            _ => Vec::new(),
+        };
+        Self { here, within }
     }
 }
 
-fn note_value(
-    value: &Spanned<DeValue>,
-    path: &str,
-    line: &dyn Fn(&Range<usize>) -> usize,
-    origins: &mut BTreeMap<String, Origin>,
-) {
-    match value.get_ref() {
-        DeValue::Table(inner) => note_lines(inner, path, line, origins),
-        DeValue::Array(items) => {
-            for (i, item) in items.iter().enumerate() {
-                let path = format!("{path}[{i}]");
-                origins.insert(path.clone(), Origin::Line(line(&item.span())));
-                note_value(item, &path, line, origins);
-            }
-        }
-        _ => {}
-    }
+/// The first part of a dotted key, of which `gait.phases[1]` has three.
+fn first_part(key: &str) -> &str {
+    let end = key.char_indices().skip(1).find(|(_, c)| matches!(c, '.' | '['));
+    &key[..end.map_or(key.len(), |(at, _)| at)]
 }
 
 /// `prefix.key`, or just `key` at the top level.

@@ -1,7 +1,8 @@
-//! Ctrl-C stops a solve at the next iteration; a second Ctrl-C ends the program.
+//! Ctrl-C ends the program at once, or, while work must end in good order, asks it to stop; a second Ctrl-C then ends the program.
 
+use std::io::Write;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::error::IpoptError;
 
@@ -32,8 +33,30 @@ impl InterruptFlag {
     }
 }
 
-/// From now on Ctrl-C raises [`INTERRUPT`]; when it is raised already, Ctrl-C ends the program with exit code 130.
-/// Further calls do nothing.
+/// How many [`InGoodOrder`] there are.
+static IN_GOOD_ORDER: AtomicUsize = AtomicUsize::new(0);
+
+/// While there is one, the first Ctrl-C only raises [`INTERRUPT`]: for a solve whose iterate is kept, the writing of a file, and a process
+/// that has others to end. Whoever holds it polls the flag several times a second.
+#[derive(Debug)]
+pub struct InGoodOrder(());
+
+impl InGoodOrder {
+    /// From now on.
+    pub fn begin() -> Self {
+        IN_GOOD_ORDER.fetch_add(1, Ordering::SeqCst);
+        Self(())
+    }
+}
+
+impl Drop for InGoodOrder {
+    fn drop(&mut self) {
+        IN_GOOD_ORDER.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// From now on Ctrl-C ends the program with exit code 130, in whatever stage it is. While there is an [`InGoodOrder`], only the second
+/// one does, and the first raises [`INTERRUPT`]. Further calls do nothing.
 ///
 /// # Errors
 /// [`IpoptError::CtrlC`] when the operating system refuses, or another part of the program handles Ctrl-C.
@@ -41,7 +64,9 @@ pub fn install_ctrl_c() -> Result<(), IpoptError> {
     static INSTALLED: OnceLock<Result<(), IpoptError>> = OnceLock::new();
     let install = || {
         ctrlc::set_handler(|| {
-            if INTERRUPT.raise() {
+            if INTERRUPT.raise() || IN_GOOD_ORDER.load(Ordering::SeqCst) == 0 {
+                // Errors, such as of a closed terminal, change nothing.
+                let _ = writeln!(std::io::stderr(), "interrupted");
                 std::process::exit(EXIT_CODE);
             }
         })

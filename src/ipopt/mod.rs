@@ -36,7 +36,7 @@ mod solution;
 mod solve;
 
 pub use error::IpoptError;
-pub use interrupt::{INTERRUPT, InterruptFlag, install_ctrl_c};
+pub use interrupt::{INTERRUPT, InGoodOrder, InterruptFlag, install_ctrl_c};
 pub use linear_solver::LinearSolver;
 pub use memory::keep_freed_memory;
 pub use option_value::OptionValue;

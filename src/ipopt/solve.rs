@@ -7,6 +7,7 @@ use super::application::Iterate;
 use super::attempt::{Attempt, Ended};
 use super::callbacks::{Session, Stop};
 use super::error::IpoptError;
+use super::interrupt::InGoodOrder;
 use super::layout::ProblemLayout;
 use super::linear_solver::LinearSolver;
 use super::lock::SolverLock;
@@ -31,6 +32,7 @@ pub fn solve<P: NlpProblem>(
     let layout = ProblemLayout::of(problem)?;
     let x = layout.initial_point(problem)?;
     let lock = SolverLock::acquire()?;
+    let _in_good_order = InGoodOrder::begin();
     let mut linear_solver = options.linear_solver.resolve(&lock)?;
 
     let start = Instant::now();

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::{GroundGrid, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
 use crate::Result;
 use crate::files::npz::NpzReader;
+use crate::robot::is_name;
 use crate::warp::MapGrid;
 
 /// Relative rounding errors of a rectangle's corners; also its least side, m.
@@ -98,7 +99,13 @@ fn read_meta(npz: &mut NpzReader) -> Result<Meta> {
             return Err(npz.error("meta", format!("schema is {given}, expected {PLAN_SCHEMA}")));
         }
     }
-    serde_json::from_value(value).map_err(|e| npz.error("meta", e))
+    let meta: Meta = serde_json::from_value(value).map_err(|e| npz.error("meta", e))?;
+    if !is_name(&meta.robot.name) {
+        return Err(
+            npz.error("meta", format!("robot.name is {:?}, expected a name, not a path", meta.robot.name))
+        );
+    }
+    Ok(meta)
 }
 
 /// (E, P), padded with NaN at the end of each row.

@@ -2,6 +2,8 @@
 
 use std::fmt::{Display, Write};
 
+use crate::visible::visible;
+
 /// Points of a polyline closer than this to the last one drawn are left out, pixels.
 const MIN_STEP: f64 = 0.4;
 /// Average width of a character, in font sizes.
@@ -147,7 +149,7 @@ impl Svg {
         } else {
             format!(" transform=\"rotate({angle} {x:.1} {y:.1})\"")
         };
-        let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        let text = visible(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
         let _ = writeln!(
             self.body,
             "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{color}\"{weight}{rotation}>{text}</text>"
@@ -164,5 +166,17 @@ impl Svg {
         );
         draw(self);
         self.body.push_str("</g>\n");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_neither_markup_nor_control_characters() {
+        let mut svg = Svg::new(10.0, 10.0);
+        svg.text([1.0, 1.0], "<b>&\u{1b}\n", Font::LABEL);
+        assert!(svg.finish().contains(">&lt;b&gt;&amp;\\u{1b}\\n</text>"));
     }
 }

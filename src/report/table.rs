@@ -4,6 +4,7 @@ use crate::check::CheckReport;
 use crate::plan::CheckRow;
 use crate::planner::derivatives::DerivativeError;
 use crate::planner::violation::BlockViolation;
+use crate::visible::visible;
 use crate::warp::{Distribution, MapReport};
 
 /// A table with a header and right-aligned columns of numbers.
@@ -25,7 +26,8 @@ impl Table {
 
     /// Adds a row; missing cells stay empty.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        let mut cells: Vec<String> = cells.into_iter().take(self.header.len()).collect();
+        let cells = cells.into_iter().take(self.header.len());
+        let mut cells: Vec<String> = cells.map(|cell| visible(&cell).into_owned()).collect();
         cells.resize(self.header.len(), String::new());
         self.rows.push(cells);
     }

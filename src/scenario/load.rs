@@ -27,9 +27,18 @@ pub struct LoadedScenario {
     /// Name and SHA-256 (hexadecimal) of each file read so far: the scenario's and the robot's, where these are files.
     pub inputs: Vec<(String, String)>,
     document: Document,
+    /// The scenario's file; none for one in memory.
+    file: Option<PathBuf>,
 }
 
 impl LoadedScenario {
+    /// The files that it is read from: the scenario, the robot and the terrain, as far as these are files.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let Scenario { robot, terrain, .. } = &self.scenario;
+        let named = [robot.file.as_deref(), terrain.file()].into_iter().flatten();
+        named.map(|name| self.base_dir.join(name)).chain(self.file.clone()).collect()
+    }
+
     /// An input error at a key of the scenario, with file and line.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         self.document.error(key, what)
@@ -61,6 +70,7 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<LoadedScenario> {
     let name = path.file_name().map(|name| (name.to_string_lossy().into_owned(), sha256_hex(&text)));
     let mut loaded = assemble(document, text, base_dir, overrides)?;
     loaded.inputs.extend(name);
+    loaded.file = Some(path.to_path_buf());
     Ok(loaded)
 }
 
@@ -109,6 +119,7 @@ fn assemble(
         overrides: overrides.to_vec(),
         base_dir,
         document,
+        file: None,
     })
 }
 

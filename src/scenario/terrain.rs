@@ -29,6 +29,19 @@ pub enum TerrainSpec {
 }
 
 impl TerrainSpec {
+    /// The file that it names, relative to the scenario; none for a function.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            TerrainSpec::Heightmap(spec) => Some(&spec.file),
+            TerrainSpec::Flat(_)
+            | TerrainSpec::Rippled(_)
+            | TerrainSpec::Conic(_)
+            | TerrainSpec::Hilly(_)
+            | TerrainSpec::Pit(_)
+            | TerrainSpec::Formula(_) => None,
+        }
+    }
+
     /// Its `kind`, as in a scenario.
     pub fn kind(&self) -> &'static str {
         match self {

@@ -1,12 +1,12 @@
 //! A cache of maps on disk.
 //!
-//! A cache file consists of a header, one line of JSON, and the control points as little-endian doubles. Its name is the SHA-256 hash
-//! of everything that a map depends on: the terrain's samples, the specification and [`SOLVER_VERSION`].
+//! A cache file consists of the SHA-256 hash of all that follows, on a line; a report, one line of JSON; and the control points as
+//! little-endian doubles. Its name is the hash of everything that a map depends on: the terrain's samples, the specification and
+//! [`SOLVER_VERSION`].
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::build::{MapProgress, build};
@@ -18,13 +18,6 @@ use crate::{Error, Result, digest, files};
 
 /// Increase this with every change that yields a different map of the same terrain.
 const SOLVER_VERSION: u32 = 6;
-
-#[derive(Serialize, Deserialize)]
-struct Header {
-    /// SHA-256 of the control points as stored.
-    checksum: String,
-    report: MapReport,
-}
 
 /// `$WARPGAIT_CACHE`, or else `$XDG_CACHE_HOME/warpgait`, or else `~/.cache/warpgait`; none if none of these variables is set.
 pub fn default_cache_dir() -> Option<PathBuf> {
@@ -79,15 +72,20 @@ fn key(field: &Heightfield, spec: &MapSpec) -> String {
 
 /// The map in a cache file; none if the file is missing or damaged.
 fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, MapReport)> {
-    let bytes = std::fs::read(path).ok()?;
-    let end = bytes.iter().position(|b| *b == b'\n')?;
-    let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
-    let payload = &bytes[end + 1..];
-    if digest::sha256_hex(payload) != header.checksum {
+    let bytes = files::read(path, files::MAX_FILE).ok()?;
+    let (checksum, content) = line(&bytes)?;
+    if digest::sha256_hex(content).as_bytes() != checksum {
         return None;
     }
-    // If the specification leaves the grid open, the one built may be finer than the default.
-    let spec = MapSpec { cells: Some(header.report.cells), ..spec.clone() };
+    let (report, payload) = line(content)?;
+    let report: MapReport = serde_json::from_slice(report).ok()?;
+    // If the specification leaves the grid open, the one built may be finer than the default. Its size must fit before it is allocated.
+    let points =
+        report.cells.iter().try_fold(1, |n, cells| cells.checked_add(3).and_then(|c| c.checked_mul(n)));
+    if points.and_then(|n: usize| n.checked_mul(size_of::<[f64; 3]>())) != Some(payload.len()) {
+        return None;
+    }
+    let spec = MapSpec { cells: Some(report.cells), ..spec.clone() };
     let mut map = WarpMap::flat(field.extent(), &spec).ok()?;
     let points = map.control_points_mut();
     if payload.len() != size_of_val(points) {
@@ -97,16 +95,21 @@ fn read(path: &Path, field: &Heightfield, spec: &MapSpec) -> Option<(WarpMap, Ma
     for (target, value) in points.as_flattened_mut().iter_mut().zip(values) {
         *target = value;
     }
-    Some((map, header.report))
+    Some((map, report))
+}
+
+/// The first line, and what follows.
+fn line(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = bytes.iter().position(|b| *b == b'\n')?;
+    Some((&bytes[..end], &bytes[end + 1..]))
 }
 
 fn write(path: &Path, map: &WarpMap, report: &MapReport) -> Result<()> {
-    let payload: Vec<u8> = map.control_points().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
-    let header = Header { checksum: digest::sha256_hex(&payload), report: report.clone() };
-    let mut bytes = serde_json::to_vec(&header).map_err(|e| Error::Internal(format!("map report: {e}")))?;
-    bytes.push(b'\n');
-    bytes.extend_from_slice(&payload);
+    let mut content = serde_json::to_vec(report).map_err(|e| Error::Internal(format!("map report: {e}")))?;
+    content.push(b'\n');
+    content.extend(map.control_points().as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+    let checksum = format!("{}\n", digest::sha256_hex(&content));
     let directory = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(directory).map_err(|e| Error::io(directory, e))?;
-    files::write_atomically(path, &bytes)
+    files::write_atomically(path, &[checksum.as_bytes(), &content].concat())
 }
