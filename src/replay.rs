@@ -7,40 +7,74 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-/// Exits with 0 when Python finds the package, without importing it, which would take a second. To Python, any folder named
-/// `warpgait` in the working folder, such as a clone of the repository, is a package, too, but one without an origin.
+/// Exits with 0 when Python finds the package, without importing it, which would take a second.
 const HAS_PACKAGE: &str = "import importlib.util, sys; \
      found = importlib.util.find_spec('warpgait'); sys.exit(found is None or found.origin is None)";
 
-/// How many folders above the program are searched: for `target/release/warpgait`, this reaches the repository.
-const FOLDERS_ABOVE: usize = 4;
+/// The environment variable that names a Python to use.
+const PYTHON_VARIABLE: &str = "WARPGAIT_PYTHON";
 
-/// A Python that has the package: that of `.venv` in the working folder or in a folder above the program, or `python3`.
+/// How many folders above the program are searched for its repository: for `target/release/warpgait`, this reaches it.
+const FOLDERS_ABOVE: usize = 4;
+/// What tells the folder of the repository from others.
+const OF_REPOSITORY: &str = "validate/pyproject.toml";
+/// The folder that this program was compiled in.
+const COMPILED_IN: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A Python that has the package: `$WARPGAIT_PYTHON`, or else that of `.venv` in the program's repository, or else `python3`. What lies in
+/// the working folder is neither run nor imported.
 ///
 /// # Errors
 /// When none has it; the message tells how to install it.
 pub fn python() -> Result<PathBuf> {
+    if let Some(named) = std::env::var_os(PYTHON_VARIABLE).filter(|named| !named.is_empty()) {
+        let named = PathBuf::from(named);
+        return if has_package(&named) {
+            Ok(named)
+        } else {
+            let what =
+                "this Python cannot be run, is older than 3.11, or does not have the package `warpgait`";
+            Err(Error::input(format!("{PYTHON_VARIABLE}={}: {what}", named.display())))
+        };
+    }
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
-        Error::input(
-            "the replay needs the Python package `warpgait`, which neither .venv nor python3 has; to install it, run \
-             scripts/setup --python in the folder of the repository, or pip install ./validate in an environment of yours",
-        )
+        Error::input(format!(
+            "the replay needs the Python package `warpgait`, which neither .venv in the program's repository nor python3 has; \
+             run scripts/setup --python in the folder of the repository, or pip install ./validate in an environment of yours \
+             and name its Python: {PYTHON_VARIABLE}=.venv/bin/python",
+        ))
     })
 }
 
-fn candidates() -> Vec<PathBuf> {
-    let mut folders = vec![PathBuf::from(".")];
-    if let Ok(program) = std::env::current_exe() {
-        folders.extend(program.ancestors().skip(1).take(FOLDERS_ABOVE).map(Path::to_path_buf));
+/// Runs this Python's package, isolated from the working folder: that is not searched for modules, whatever `PYTHONPATH` says.
+pub fn command(python: &Path) -> Command {
+    let mut command = Command::new(python);
+    command.arg("-P");
+    if let Some(path) = std::env::var_os("PYTHONPATH") {
+        // To Python, an empty entry is the working folder.
+        match std::env::join_paths(std::env::split_paths(&path).filter(|folder| folder.is_absolute())) {
+            Ok(path) if !path.is_empty() => command.env("PYTHONPATH", path),
+            _ => command.env_remove("PYTHONPATH"),
+        };
     }
-    let mut pythons: Vec<PathBuf> = folders.iter().map(|folder| folder.join(".venv/bin/python")).collect();
+    command
+}
+
+fn candidates() -> Vec<PathBuf> {
+    let program = std::env::current_exe().unwrap_or_default();
+    let above = program.ancestors().skip(1).take(FOLDERS_ABOVE).filter(|folder| folder.is_absolute());
+    let repositories = above.chain([Path::new(COMPILED_IN)]).filter(|f| f.join(OF_REPOSITORY).is_file());
+    let mut pythons: Vec<PathBuf> = repositories.map(|folder| folder.join(".venv/bin/python")).collect();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    // A relative entry would lead into the working folder.
+    let folders = std::env::split_paths(&path).filter(|folder| folder.is_absolute());
+    pythons.extend(folders.map(|folder| folder.join("python3")).find(|python| python.is_file()));
     pythons.retain(|python| python.exists());
-    pythons.push("python3".into());
     pythons
 }
 
 fn has_package(python: &Path) -> bool {
-    let mut command = Command::new(python);
+    let mut command = command(python);
     command.args(["-c", HAS_PACKAGE]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }

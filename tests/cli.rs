@@ -144,49 +144,86 @@ fn check_refuses_bad_input() {
     );
 }
 
-#[cfg(unix)]
-#[test]
-fn validate_runs_python() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = tempfile::tempdir().unwrap();
-    let bin = folder.path().join(".venv/bin");
-    std::fs::create_dir_all(&bin).unwrap();
-    // Poses as Python: it has the package, prints its arguments, and judges the plan not trackable.
-    let script = "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\necho \"$@\"\nexit 1\n";
-    std::fs::write(bin.join("python"), script).unwrap();
-    std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
-    let (code, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--friction", "0.5"]);
-    assert_eq!((code, out.trim()), (1, "-m warpgait.validate a.plan.npz --friction 0.5"));
-    let (_, out, _) = warpgait(folder.path(), &["--json", "validate", "a.plan.npz"]);
-    assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
-
-    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
-    assert_eq!(out.trim(), "-m warpgait.validate a.plan.npz --json");
-
-    // A Python that crashes is neither "not trackable" nor an interruption.
-    std::fs::write(bin.join("python"), "#!/bin/sh\n[ \"$1\" = -c ] && exit 0\nkill -s SEGV $$\n").unwrap();
-    let (code, _, err) = warpgait(folder.path(), &["validate", "a.plan.npz"]);
-    assert_eq!(code, 2, "{err}");
-    assert!(err.contains("crashed"), "{err}");
-    let (_, out, _) = warpgait(folder.path(), &["validate", "a.plan.npz", "--json"]);
-    assert!(out.contains("\"error\""), "{out}");
+/// As [`warpgait`], with a Python of the user's own.
+fn with_python(folder: &Path, python: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_warpgait"));
+    let output = command.current_dir(folder).args(arguments).env("WARPGAIT_PYTHON", python).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
-/// A clone of the repository is a folder named `warpgait`, which Python in the folder above takes for a package.
-#[cfg(unix)]
-#[test]
-fn a_folder_of_the_same_name_is_not_the_python_package() {
+/// Writes a program of the shell.
+fn script(path: &Path, text: &str) {
     use std::os::unix::fs::PermissionsExt;
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, format!("#!/bin/sh\n{text}\n")).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn validate_runs_python() {
     let folder = tempfile::tempdir().unwrap();
-    let bin = folder.path().join(".venv/bin");
-    std::fs::create_dir_all(&bin).unwrap();
-    std::fs::create_dir(folder.path().join("warpgait")).unwrap();
-    // The search for the package runs in the system's Python, not in that of the repository's environment.
-    let script = "#!/bin/sh\n[ \"$1\" = -c ] && exec python3 \"$@\"\necho chosen\n";
-    std::fs::write(bin.join("python"), script).unwrap();
-    std::fs::set_permissions(bin.join("python"), std::fs::Permissions::from_mode(0o755)).unwrap();
-    let (_, out, _) = warpgait(folder.path(), &["validate", "none.plan.npz", "--no-files"]);
-    assert!(!out.contains("chosen"), "{out}");
+    let python = folder.path().join("python");
+    let validate = |arguments: &[&str]| with_python(folder.path(), &python, arguments);
+    // Poses as Python: it has the package, prints its arguments, and judges the plan not trackable.
+    script(&python, "[ \"$2\" = -c ] && exit 0\necho \"$@\"\nexit 1");
+    let (code, out, _) = validate(&["validate", "a.plan.npz", "--friction", "0.5"]);
+    assert_eq!((code, out.trim()), (1, "-P -m warpgait.validate a.plan.npz --friction 0.5"));
+    let (_, out, _) = validate(&["--json", "validate", "a.plan.npz"]);
+    assert_eq!(out.trim(), "-P -m warpgait.validate a.plan.npz --json");
+
+    let (_, out, _) = validate(&["validate", "a.plan.npz", "--json"]);
+    assert_eq!(out.trim(), "-P -m warpgait.validate a.plan.npz --json");
+
+    // A Python that crashes is neither "not trackable" nor an interruption.
+    script(&python, "[ \"$2\" = -c ] && exit 0\nkill -s SEGV $$");
+    let (code, _, err) = validate(&["validate", "a.plan.npz"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("crashed"), "{err}");
+    let (_, out, _) = validate(&["validate", "a.plan.npz", "--json"]);
+    assert!(out.contains("\"error\""), "{out}");
+
+    script(&python, "exit 1");
+    let (code, _, err) = validate(&["validate", "a.plan.npz"]);
+    assert!(code == 2 && err.contains("WARPGAIT_PYTHON=") && err.contains("does not have"), "{err}");
+}
+
+/// Whatever lies in the working folder, a clone of the repository for instance, is not taken for the package or for Python.
+#[test]
+fn nothing_in_the_working_folder_is_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mark = "open('ran', 'a').write(__file__)\n";
+    std::fs::create_dir_all(at("warpgait")).unwrap();
+    for module in
+        ["numpy.py", "importlib.py", "sitecustomize.py", "warpgait/__init__.py", "warpgait/validate.py"]
+    {
+        std::fs::write(at(module), mark).unwrap();
+    }
+    for python in [".venv/bin/python", "python3", "bin/python3"] {
+        script(&at(python), "echo $0 >> ran; exit 0");
+    }
+    let path = format!(":.:bin:{}", std::env::var("PATH").unwrap());
+    // Once as found, and once with the system's Python by name, which has no package.
+    for python in ["", "python3"] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_warpgait"));
+        if !python.is_empty() {
+            let system = std::env::split_paths(&std::env::var_os("PATH").unwrap())
+                .map(|folder| folder.join(python))
+                .find(|python| python.is_file())
+                .unwrap();
+            command.env("WARPGAIT_PYTHON", system);
+        }
+        let run = command
+            .current_dir(folder.path())
+            .args(["validate", "none.plan.npz", "--no-files"])
+            .envs([("PATH", path.as_str()), ("PYTHONPATH", ":.:")])
+            .output()
+            .unwrap();
+        let ran = std::fs::read_to_string(at("ran")).unwrap_or_default();
+        assert_eq!(ran, "", "{python}: {}", String::from_utf8_lossy(&run.stderr));
+        assert_eq!(run.status.code(), Some(2));
+    }
 }
 
 const FLAT: &str = "\
