@@ -16,8 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .console import ERROR, complain, emit, run
 from .criteria import Criterion, Metric, Verdict
 from .errors import InputError
+from .files import ensure_outputs, replacing
 from .plan import Plan, read_plan
 from .settings import Disturbance, Settings
 from .validation import validate
@@ -134,7 +136,7 @@ class Measurements:
     def write_csv(self, target: Path) -> None:
         """Every value, one in a row."""
         head = ["plan", "spoiling", "layer", "metric", "value", "unit", "verdict"]
-        with target.open("w", newline="", encoding="utf-8") as file:
+        with replacing(target) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([head, *self.rows])
 
 
@@ -146,6 +148,7 @@ def main(words: list[str] | None = None) -> int:
     options = parser.parse_args(words)
     found = Measurements()
     try:
+        ensure_outputs([options.csv] if options.csv else [], options.plans)
         for path in options.plans:
             plan = read_plan(path)
             for spoiling in (GOOD, *SPOILINGS):
@@ -154,11 +157,11 @@ def main(words: list[str] | None = None) -> int:
         if options.csv:
             found.write_csv(options.csv)
     except (InputError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    print("\n".join([*table(found.values, found.criteria), "", *verdicts(found.judged)]))
+        complain(error)
+        return ERROR
+    emit("\n".join([*table(found.values, found.criteria), "", *verdicts(found.judged)]))
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(run(main))

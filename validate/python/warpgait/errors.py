@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+from .text import escape
+
 REPORT_SCHEMA = 1  # of NAME.report.json
 
 
 class InputError(ValueError):
     """Something given to warpgait cannot be used. The message says what, where, and what to do."""
+
+
+def error_page(plan: str, message: str) -> str:
+    """The page of a plan that could not be judged."""
+    plan, message = escape(plan), escape(message)
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{plan}: error</title><h1>{plan}</h1>'
+        f"<p><strong>error. There is no verdict on this plan.</strong></p><p>{message}</p></html>\n"
+    )
 
 
 def error_report(plan: str, message: str) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class FilmError(Exception):
 def ffmpeg() -> str | None:
     """The path of the system's ffmpeg, or of the one in the Python package imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
-    if found:
+    if found and os.path.isabs(found):  # a relative one lies in the working folder
         return found
     try:
         return str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
@@ -133,8 +133,10 @@ def _write_scene(v: Validation, job: _Job, folder: Path) -> None:
 
 def _render_with(backend: str, job: str, seconds: float) -> str | None:
     """Run `render.py` with one OpenGL; returns the last line of its error, or None."""
-    environment = dict(os.environ, MUJOCO_GL=backend, PYTHONPATH=os.pathsep.join(sys.path))
-    command = [sys.executable, "-m", "warpgait.render", job]
+    # An empty entry of the path would be the working folder.
+    path = os.pathsep.join(folder for folder in sys.path if os.path.isabs(folder))
+    environment = dict(os.environ, MUJOCO_GL=backend, PYTHONPATH=path)
+    command = [sys.executable, "-P", "-m", "warpgait.render", job]
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:

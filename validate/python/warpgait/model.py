@@ -19,6 +19,7 @@ import numpy as np
 from .arrays import Array, Integers
 from .errors import InputError
 from .settings import MUJOCO_VERSION
+from .text import is_name
 
 JOINTS = ("HAA", "HFE", "KFE")  # of a leg, from the hip down: hip abduction, hip flexion, knee flexion
 
@@ -33,10 +34,10 @@ def check_mujoco() -> None:
 
 
 def robots_directories() -> list[Path]:
-    """Where models are looked for: $WARPGAIT_ROBOTS, `models` in an installed package, `robots` above this file or the working folder."""
+    """Where models are looked for: $WARPGAIT_ROBOTS, `models` in an installed package, `robots` above this file."""
     named = [Path(p) for p in os.environ.get("WARPGAIT_ROBOTS", "").split(os.pathsep) if p]
     here = Path(__file__).resolve()
-    above = [p / "robots" for p in (*here.parents[:4], Path.cwd(), *Path.cwd().parents)]
+    above = [p / "robots" for p in here.parents[:4]]
     return [*named, *(p for p in (here.parent / "models", *above) if p.is_dir())]
 
 
@@ -45,12 +46,19 @@ def available_models() -> list[str]:
     return sorted({f.stem for d in robots_directories() for f in d.glob("*.xml")})
 
 
+def model_file(model: str) -> Path:
+    """The MJCF file that a user names: a file that ends in .xml, or that of a robot."""
+    if not model.endswith(".xml"):
+        return find_model(model)
+    if not Path(model).is_file():
+        raise InputError(f"{model}: there is no such model file")
+    return Path(model)
+
+
 def find_model(name: str) -> Path:
-    """The MJCF file of robot `name`, or the file `name` itself if it ends in .xml."""
-    if name.endswith(".xml"):
-        if not Path(name).is_file():
-            raise InputError(f"{name}: there is no such model file")
-        return Path(name)
+    """The MJCF file of robot `name`. A path is no name: a plan must not lead to a file."""
+    if not is_name(name):
+        raise InputError(f"{name!r} is not the name of a robot; only --model takes a file")
     for directory in robots_directories():
         path = directory / f"{name}.xml"
         if path.is_file():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from .files import write_text
 from .metrics import FORCE_WINDOW, filtered_forces
 from .model import JOINTS
 from .svg import Line, chart, contact_bars
+from .text import escape
 from .validation import Trial, Validation
 
 _STYLE = """

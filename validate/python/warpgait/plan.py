@@ -6,8 +6,6 @@ World frame: x forward, y left, z up. SI units. N samples, E feet. Quaternions a
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,9 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .archive import Archive
 from .arrays import Array, Bools, runs
 from .errors import InputError
 from .geometry import smootherstep
+from .text import is_name
 
 SCHEMA = 1
 
@@ -132,43 +132,10 @@ class Plan:
         return self.robot.mass * float(np.linalg.norm(self.robot.gravity))
 
 
-_NPZ, _NPY = b"PK\x03\x04", b"\x93NUM"  # first bytes of archives and of single arrays
-
-
-def _members(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """All arrays of the archive; raises `InputError` with the name of a damaged member."""
-    if path.is_dir():
-        raise InputError(f"{path}: a folder, not a plan (NAME.plan.npz)")
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    with path.open("rb") as file:
-        start = file.read(len(_NPZ))
-    if start != _NPZ and not start.startswith(_NPY):
-        what = "an empty file" if not start else "not an .npz archive"
-        raise InputError(f"{path}: {what}; a plan is a NAME.plan.npz that `warpgait solve` writes")
-    arrays: dict[str, npt.NDArray[Any]] = {}
-    member = ""
-    try:
-        archive = np.load(path, allow_pickle=False)
-        if not hasattr(archive, "files"):
-            raise InputError(f"{path}: a single NumPy array, not a plan (an .npz archive)")
-        with archive:
-            for member in archive.files:
-                arrays[member] = archive[member]
-    except InputError:
-        raise
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, KeyError, NotImplementedError) as error:
-        if not zipfile.is_zipfile(path):
-            raise InputError(f"{path}: damaged: truncated, or not an .npz archive") from error
-        where = f"member {member}: " if member else ""
-        raise InputError(f"{path}: {where}not readable as a plan (damaged or not an .npz archive): {error}") from error
-    return arrays
-
-
 class _Checker:
     """Reads the members of one archive and checks their shapes and types."""
 
-    def __init__(self, path: Path, arrays: dict[str, npt.NDArray[Any]]) -> None:
+    def __init__(self, path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
         self.sizes: dict[str, int] = {}
 
@@ -213,7 +180,7 @@ class _Checker:
             raise self.fail("meta", "expected a string without dimensions")
         try:
             meta = json.loads(str(array))
-        except json.JSONDecodeError as error:
+        except (ValueError, RecursionError) as error:
             raise self.fail("meta", f"is not JSON: {error}") from error
         if not isinstance(meta, dict):
             raise self.fail("meta", "is not a JSON object")
@@ -242,6 +209,8 @@ def _robot(check: _Checker, meta: dict[str, Any]) -> PlannedRobot:
     except (TypeError, ValueError) as error:
         raise check.fail("meta", f"robot: {error}") from error
     numbers = np.concatenate([[result.mass, result.friction], result.inertia.ravel(), result.gravity.ravel()])
+    if not is_name(result.name):
+        raise check.fail("meta", f"robot.name is {result.name!r}, expected a name, not a path")
     if result.inertia.shape != (3, 3) or result.gravity.shape != (3,) or not np.isfinite(numbers).all():
         raise check.fail("meta", "robot: inertia must be 3x3 and gravity a vector of 3, all finite")
     if result.mass <= 0 or result.friction <= 0 or not result.gravity.any():
@@ -283,7 +252,7 @@ def _check_patches(check: _Checker) -> None:
 def read_plan(path: str | Path) -> Plan:
     """Read a plan file; raises `InputError` with file, member and reason if it cannot be used."""
     path = Path(path)
-    check = _Checker(path, _members(path))
+    check = _Checker(path, Archive(path))
     meta = check.meta()
     names = check.take("foot_names")
     if names.dtype.kind != "U" or names.ndim != 1 or len(names) == 0:

@@ -42,7 +42,7 @@ def png(image: Image) -> bytes:
 def _encoder(target: Path, size: tuple[int, int], ffmpeg: str, frames_per_second: int) -> subprocess.Popen[bytes]:
     """An ffmpeg that makes an MP4 of raw frames from its standard input."""
     frames = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(frames_per_second), "-i", "-"]
-    film = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(target)]
+    film = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(target)]
     return subprocess.Popen([ffmpeg, "-y", "-loglevel", "error", *frames, *film], stdin=subprocess.PIPE)
 
 

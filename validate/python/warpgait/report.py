@@ -103,5 +103,5 @@ def write_replay(v: Validation, target: Path) -> None:
         "joint_names": np.array(index.joint_names),
         "foot_names": np.array(index.feet),
     }
-    with replacing(target) as temporary:
-        np.savez_compressed(temporary, **members)
+    with replacing(target) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **members)

@@ -7,7 +7,6 @@ stance. The torso is the box around the trunk's collision shapes. `warpgait.reac
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -17,6 +16,7 @@ import mujoco
 import numpy as np
 
 from .arrays import Array
+from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import write_text
 from .kinematics import Leg, legs
@@ -248,16 +248,16 @@ def main(words: list[str] | None = None) -> int:
             text = to_toml(derive(path))
             if not options.check:
                 write_text(target, text)
-                print(f"wrote {target}")
+                emit(f"wrote {target}")
             elif not target.is_file() or target.read_text(encoding="utf-8") != text:
                 stale.append(name)
         if stale:
             raise InputError(f"robot files that do not match their models: {', '.join(stale)}; run python -m warpgait.robots")
     except (InputError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        complain(error)
+        return ERROR
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(run(main))

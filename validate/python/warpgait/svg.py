@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from .arrays import Array, Bools, runs
+from .text import escape
 
 FAR = 4.0  # a limit above all values by more than this factor would flatten them; the title names it instead
 POINTS = 600  # bins of a curve, about as many as the chart has pixels

@@ -1,7 +1,8 @@
 """`python -m warpgait.validate P.plan.npz`: will the robot walk it?
 
 Writes P.report.json, P.report.html and P.replay.npz beside the plan, or into --output. Exit code 0: trackable (pass or marginal); 1: not
-trackable; 2: bad input, or something needed is missing.
+trackable; 2: bad input, something needed is missing, or standard output cannot be written. Reports of an earlier run are replaced by the error
+when there is no verdict.
 """
 
 from __future__ import annotations
@@ -16,16 +17,20 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import InputError, error_report
-from .files import write_text
+from .console import ERROR, OutputError, complain, emit, run
+from .errors import InputError, error_page, error_report
+from .files import ensure_outputs, write_text
 from .settings import MUJOCO_VERSION, Disturbance, Settings
+from .text import visible
 
 if TYPE_CHECKING:
     from .validation import Validation
 
 # MuJoCo and daqp are imported late, so that a missing package gives a message instead of a traceback.
 
-TRACKABLE, NOT_TRACKABLE, ERROR, INTERRUPTED = 0, 1, 2, 130  # exit codes
+REPORTS = ".report.json", ".report.html"  # endings
+TRACKABLE, NOT_TRACKABLE, INTERRUPTED = 0, 1, 130  # exit codes; 2 is `ERROR`
+UNFINISHED = "the replay has not finished"
 
 
 def _stem(plan: Path) -> str:
@@ -144,11 +149,13 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
 
     def say(text: str) -> None:
         if not (options.quiet or options.json):
-            print(f"validate: {text}", file=sys.stderr)
+            print(f"validate: {visible(text)}", file=sys.stderr)
 
     loaded = plan.read_plan(options.plan)
     if not options.no_files:
         _make_folder(folder)
+        ensure_outputs(_outputs(options, folder), _inputs(options))
+        _replace_reports(options, folder, UNFINISHED, only_old=True)
     found = validation.validate(loaded, settings, say)
     if not options.no_files:
         _write(options, folder, found, say)
@@ -165,20 +172,29 @@ def _make_folder(folder: Path) -> None:
         ) from error
 
 
+def _outputs(options: argparse.Namespace, folder: Path) -> list[Path]:
+    """The files that a run writes."""
+    pictures = [".png"] * options.still + [".mp4"] * options.video
+    return [folder / f"{_stem(options.plan)}{end}" for end in (*REPORTS, ".replay.npz", *pictures)]
+
+
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    """The files that a run reads."""
+    model = [Path(options.model)] if options.model and options.model.endswith(".xml") else []
+    return [options.plan, *model]
+
+
 def _print(options: argparse.Namespace, folder: Path, found: Validation) -> None:
     """The verdict on standard output, as JSON or for people."""
     from . import report
 
-    try:
-        if options.json:
-            print(json.dumps(report.as_dict(found), allow_nan=False))
-        else:
-            _print_summary(found)
-            if not options.no_files:
-                print(f"{folder / _stem(options.plan)}.report.html")
-        sys.stdout.flush()
-    except BrokenPipeError:  # the reader of the output has closed it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if options.json:
+        emit(json.dumps(report.as_dict(found), allow_nan=False))
+        return
+    lines = _summary(found)
+    if not options.no_files:
+        lines.append(visible(folder / f"{_stem(options.plan)}.report.html"))
+    emit("\n".join(lines))
 
 
 def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Callable[[str], None]) -> None:
@@ -200,25 +216,21 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
             film.video(found, folder / f"{stem}.mp4")
     except film.FilmError as error:
         note = str(error)
-        print(f"validate: {note}", file=sys.stderr)
+        print(f"validate: {visible(note)}", file=sys.stderr)
     report.write_json(found, folder / f"{stem}.report.json")
     page.write_html(found, folder / f"{stem}.report.html", pictures, note)
     report.write_replay(found, folder / f"{stem}.replay.npz")
 
 
-def _print_summary(found: Validation) -> None:
-    print(f"{found.plan.path.name}: {found.verdict.word} ({found.model_path.stem}, {found.seconds:.1f} s)")
-    for note in found.notes:
-        print(f"  note: {note}")
-    for metric in found.counted_metrics:
-        if metric.verdict.value:
-            print(f"  {metric}")
-    first = found.first_failure
-    if first:
-        print(f"  first failure at {first}")
-    for trial in found.trials:
-        if not trial.counts:
-            print(f"  {trial.name}: {trial.verdict.word}")
+def _summary(found: Validation) -> list[str]:
+    """The verdict, a line for each fact."""
+    lines = [f"{found.plan.path.name}: {found.verdict.word} ({found.model_path.stem}, {found.seconds:.1f} s)"]
+    lines += [f"  note: {note}" for note in found.notes]
+    lines += [f"  {metric}" for metric in found.counted_metrics if metric.verdict.value]
+    if found.first_failure:
+        lines.append(f"  first failure at {found.first_failure}")
+    lines += [f"  {trial.name}: {trial.verdict.word}" for trial in found.trials if not trial.counts]
+    return [visible(line) for line in lines]
 
 
 def main(words: list[str] | None = None) -> int:
@@ -232,32 +244,42 @@ def main(words: list[str] | None = None) -> int:
         return ERROR
     try:
         return _run(options, settings, folder)
-    except (InputError, OSError) as error:
-        _print_error(options, str(error))
-        if not options.no_files and options.plan.is_file() and folder.is_dir():
-            _write_error(options, folder, str(error))
+    except OutputError as error:  # the files are written
+        complain(error)
         return ERROR
+    except (InputError, OSError) as error:
+        message, code = str(error), ERROR
     except KeyboardInterrupt:
         print("validate: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        message, code = "the replay was interrupted", INTERRUPTED
     except Exception:  # Python's own exit code, 1, would mean "not trackable"
         traceback.print_exc()
-        _print_error(options, "the replay itself failed; please report this with the plan")
-        return ERROR
+        message, code = "the replay itself failed; please report this with the plan", ERROR
+    if not options.no_files and folder.is_dir():
+        # A plan that is not there gets no report; one that was there has one.
+        _replace_reports(options, folder, message, only_old=code == INTERRUPTED or not options.plan.is_file())
+    if code == ERROR:
+        _print_error(options, message)
+    return code
 
 
 def _print_error(options: argparse.Namespace, message: str) -> None:
-    print(f"error: {message}", file=sys.stderr)
+    complain(message)
     if options.json:
-        print(json.dumps(error_report(options.plan.name, message)))
+        emit(json.dumps(error_report(options.plan.name, message)))
 
 
-def _write_error(options: argparse.Namespace, folder: Path, message: str) -> None:
-    """A report that says why there is no verdict, if it can be written at all."""
-    text = json.dumps(error_report(options.plan.name, message), indent=2, ensure_ascii=False) + "\n"
-    with suppress(OSError):
-        write_text(folder / f"{_stem(options.plan)}.report.json", text)
+def _replace_reports(options: argparse.Namespace, folder: Path, message: str, only_old: bool) -> None:
+    """Reports that say why there is no verdict, in place of those of an earlier run, as far as they can be written at all."""
+    name = options.plan.name
+    texts = json.dumps(error_report(name, message), indent=2, ensure_ascii=False) + "\n", error_page(name, message)
+    for end, text in zip(REPORTS, texts, strict=True):
+        report = folder / f"{_stem(options.plan)}{end}"
+        if report.exists() or (end == REPORTS[0] and not only_old):
+            with suppress(InputError, OSError):
+                ensure_outputs([report], _inputs(options))
+                write_text(report, text)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(run(main))

@@ -15,7 +15,7 @@ from .arrays import Array
 from .controllers import Controller, JointPD, WholeBody
 from .criteria import Metric, Verdict
 from .metrics import judge_closed_loop, judge_open_loop
-from .model import Indices, check_mujoco, find_model, indices, load_spec
+from .model import Indices, check_mujoco, find_model, indices, load_spec, model_file
 from .openloop import OpenLoop, analyze
 from .plan import Heightfield, Plan
 from .reference import Reference, sample
@@ -109,7 +109,7 @@ class _Robot:
 
 def _robot(plan: Plan, model: str | None) -> _Robot:
     """Load `model`, or the full model of the plan's robot."""
-    path = find_model(model or plan.robot.name)
+    path = model_file(model) if model else find_model(plan.robot.name)
     spec = load_spec(path)
     spec.option.gravity = plan.robot.gravity
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT

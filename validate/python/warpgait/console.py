@@ -1,0 +1,65 @@
+"""What commands print: results on standard output, everything else on standard error."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+
+from .text import visible
+
+ERROR = 2  # exit code
+
+
+class OutputError(Exception):
+    """Standard output cannot be written. What the command wrote to files stays."""
+
+
+def emit(text: str) -> None:
+    """Print a result; raises `OutputError` if it cannot be written. A reader who has closed the output, as in `… | head`, is no failure."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        _discard()
+    except OSError as error:
+        _discard()
+        raise OutputError(f"standard output: {error.strerror}") from error
+
+
+def complain(text: object) -> None:
+    """Print an error, on one line."""
+    print(f"error: {visible(text)}", file=sys.stderr)
+
+
+def _discard() -> None:
+    """From now on, nothing more goes to standard output, not even what is buffered."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def run(main: Callable[[], int]) -> int:
+    """Run a command; returns its exit code, or 2 if its output cannot be written."""
+    for descriptor in (0, 1, 2):
+        try:
+            os.fstat(descriptor)
+        except OSError:  # closed: no file may take its place
+            os.open(os.devnull, os.O_RDWR)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = main()
+    except OutputError as error:
+        complain(error)
+        return ERROR
+    except SystemExit as end:  # of argparse
+        code = end.code if isinstance(end.code, int) else ERROR
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _discard()
+    except OSError as error:
+        _discard()
+        complain(f"standard output: {error.strerror}")
+        return ERROR
+    return code
