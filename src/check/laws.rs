@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::input::closest;
-use crate::{Error, Result, files};
+use crate::Result;
+use crate::input::{Document, closest};
 
 /// One law.
 #[derive(Debug, PartialEq)]
@@ -95,24 +95,20 @@ impl CheckLimits {
 
     /// Reads `name = limit` from a TOML file; laws that it does not name keep their limit.
     pub fn read(mut self, path: &Path) -> Result<Self> {
-        let file = path.display();
-        let text = files::read_text(path)?;
-        let table: toml::Table =
-            toml::from_str(&text).map_err(|e| Error::input(format!("{file}: not TOML: {}", e.message())))?;
-        for (name, value) in table {
+        let (document, _) = Document::read(path)?;
+        for (name, value) in document.table() {
             let names: Vec<&str> = LAWS.iter().map(|law| law.name).collect();
             if !names.contains(&name.as_str()) {
-                let guess = closest(&name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let guess = closest(name, &names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let what = format!("no such law; {guess}allowed: {}", names.join(", "));
-                return Err(Error::input(format!("{file}: {name}: {what}")));
+                return Err(document.error(name, what));
             }
             let limit = value.as_float().or(value.as_integer().map(|n| n as f64));
             match limit.filter(|limit| limit.is_finite() && *limit >= 0.0) {
-                Some(limit) => self.changed.insert(name, limit),
+                Some(limit) => self.changed.insert(name.clone(), limit),
                 None => {
-                    return Err(Error::input(format!(
-                        "{file}: {name}: given {value}, allowed: a finite number of at least 0"
-                    )));
+                    let what = format!("given {value}, allowed: a finite number of at least 0");
+                    return Err(document.error(name, what));
                 }
             };
         }

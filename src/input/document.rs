@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
+use super::nesting::too_deep;
 use super::words::show;
 use crate::{Error, Result, files};
 
@@ -60,6 +61,10 @@ impl Document {
             let shown = error.span().and_then(|span| text.lines().nth(line(&span) - 1)).unwrap_or("").trim();
             Error::input(format!("{file}{at}: not TOML: {}: `{shown}`", error.message().replace('\n', "; ")))
         };
+        if let Some(at) = too_deep(text) {
+            let line = line(&(at..at));
+            return Err(Error::input(format!("{file}:{line}: brackets or braces are nested too deeply")));
+        }
         let spanned = DeTable::parse(text).map_err(malformed)?;
         let origins = Origins::of_table(None, spanned.get_ref(), &line);
         let table = toml::from_str(text).map_err(malformed)?;
@@ -82,6 +87,9 @@ impl Document {
         }
         if parts.len() > MOST_PARTS {
             return refuse(format!("the key has {} parts; at most {MOST_PARTS} are allowed", parts.len()));
+        }
+        if too_deep(value).is_some() {
+            return refuse("brackets or braces are nested too deeply".into());
         }
         let value = match toml::from_str::<Table>(&format!("value = {value}\n")) {
             Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),

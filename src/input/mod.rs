@@ -4,6 +4,7 @@
 //! converts it. Scenarios and robots are both read this way.
 
 mod document;
+mod nesting;
 mod schema;
 mod words;
 
