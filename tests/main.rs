@@ -17,6 +17,8 @@ mod plan;
 mod sheet;
 mod terrain;
 mod terrain_bad_input;
+mod terrain_formats;
+mod terrain_inputs;
 mod warp_build;
 mod warp_methods;
 mod warp_spline;

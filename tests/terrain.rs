@@ -132,15 +132,14 @@ fn every_flavour_of_png_is_read() {
     let from16: Vec<f64> = wide.iter().map(|g| f64::from(*g) / 65535.0).collect();
     check("gray 16", (Grayscale, Sixteen), [None; 2], &bytes, &from16);
 
-    let with_alpha: Vec<u8> = gray.iter().flat_map(|g| [*g, 1]).collect();
+    let with_alpha: Vec<u8> = gray.iter().flat_map(|g| [*g, 128]).collect();
     check("gray + alpha 8", (GrayscaleAlpha, Eight), [None; 2], &with_alpha, &from8);
-    let bytes: Vec<u8> = wide.iter().flat_map(|g| [g.to_be_bytes(), [0, 1]].concat()).collect();
+    let bytes: Vec<u8> = wide.iter().flat_map(|g| [g.to_be_bytes(), [128, 0]].concat()).collect();
     check("gray + alpha 16", (GrayscaleAlpha, Sixteen), [None; 2], &bytes, &from16);
 
-    let luma =
-        |r: u8, g: u8, b: u8| (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0;
-    let color = |i: u8| [10 * i, 200 - 7 * i, 3 * i];
-    let of_colors: Vec<f64> = (0..20).map(color).map(|[r, g, b]| luma(r, g, b)).collect();
+    // Gray saved in color; the channels may differ by two levels.
+    let color = |i: u8| [10 * i + 1, 10 * i, 10 * i + 2];
+    let of_colors: Vec<f64> = (0..20).map(|i| (10.0 * f64::from(i) + 1.0) / 255.0).collect();
     let bytes: Vec<u8> = (0..20).flat_map(color).collect();
     check("color 8", (Rgb, Eight), [None; 2], &bytes, &of_colors);
     let bytes: Vec<u8> = (0..20).flat_map(|i| [color(i).as_slice(), &[255]].concat()).collect();
@@ -149,7 +148,7 @@ fn every_flavour_of_png_is_read() {
     let bytes: Vec<u8> = (0..20).flat_map(color).flat_map(|v| [v, v]).collect();
     check("color 16", (Rgb, Sixteen), [None; 2], &bytes, &of_colors);
     let bytes: Vec<u8> =
-        (0..20).flat_map(|i| [color(i).as_slice(), &[9]].concat()).flat_map(|v| [v, v]).collect();
+        (0..20).flat_map(|i| [color(i).as_slice(), &[200]].concat()).flat_map(|v| [v, v]).collect();
     check("color + alpha 16", (Rgba, Sixteen), [None; 2], &bytes, &of_colors);
 
     let palette: Vec<u8> = (0..20).flat_map(color).collect();
@@ -175,7 +174,7 @@ fn transparent_pixels_are_holes_in_every_flavour() {
     let folder = tempfile::tempdir().unwrap();
     let hole = 7;
     let gray = |i: usize| if i == hole { 250 } else { 100 };
-    let alpha = |i: usize| if i == hole { 0 } else { 255 };
+    let alpha = |i: usize| if i == hole { 127 } else { 128 };
     let all = 0..20_usize;
     type Case = (&'static str, (ColorType, BitDepth), [Option<&'static [u8]>; 2], Vec<u8>);
     let cases: [Case; 5] = [
@@ -195,12 +194,12 @@ fn transparent_pixels_are_holes_in_every_flavour() {
             "gray + alpha 16",
             (GrayscaleAlpha, Sixteen),
             [None; 2],
-            all.clone().flat_map(|i| [gray(i), gray(i), 0, alpha(i)]).collect(),
+            all.clone().flat_map(|i| [gray(i), gray(i), alpha(i), 7]).collect(),
         ),
         (
             "palette with transparency",
             (Indexed, Eight),
-            [Some(&[100, 100, 100, 250, 250, 250]), Some(&[255, 0])],
+            [Some(&[100, 100, 100, 250, 250, 250]), Some(&[128, 127])],
             all.clone().map(|i| u8::from(i == hole)).collect(),
         ),
         ("a transparent gray", (Grayscale, Eight), [None, Some(&[0, 250])], all.clone().map(gray).collect()),
@@ -260,19 +259,19 @@ fn arrays_are_read_in_every_type_and_order() {
             "<f8",
             false,
             "(4, 5)",
-            &all.clone().flat_map(|i| f64::from(value(i)).to_le_bytes()).collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (0.1 * f64::from(value(i))).to_le_bytes()).collect::<Vec<_>>(),
         ),
         npy(
             ">f4",
             false,
             "(4, 5)",
-            &all.clone().flat_map(|i| (value(i) as f32).to_be_bytes()).collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (0.1 * value(i) as f32).to_be_bytes()).collect::<Vec<_>>(),
         ),
         npy(
             "<f8",
             true,
             "(4, 5)",
-            &all.clone().flat_map(|i| f64::from(fortran(i)).to_le_bytes()).collect::<Vec<_>>(),
+            &all.clone().flat_map(|i| (0.1 * f64::from(fortran(i))).to_le_bytes()).collect::<Vec<_>>(),
         ),
         npy("|u1", false, "(4, 5)", &all.clone().map(|i| value(i) as u8).collect::<Vec<_>>()),
         npy(
@@ -290,11 +289,16 @@ fn arrays_are_read_in_every_type_and_order() {
     ];
     for (k, bytes) in files.iter().enumerate() {
         fs::write(&file, bytes).unwrap();
-        for (i, h) in pixels(&ground(PLAIN, folder.path())).into_iter().enumerate() {
-            assert!((h - 2.0 * f64::from(value(i))).abs() < 1e-10, "file {k}, element {i}: {h}");
+        // Tenths of meters in the floats, units in the integers.
+        let text = PLAIN.replace("2.0", if k < 3 { "2.0" } else { "0.2" });
+        for (i, h) in pixels(&ground(&text, folder.path())).into_iter().enumerate() {
+            assert!((h - 0.2 * f64::from(value(i))).abs() < 1e-6, "file {k}, element {i}: {h}");
         }
-        let meters = ground(&PLAIN.replace("height_scale = 2.0\n", ""), folder.path());
-        assert!((pixels(&meters)[3] - f64::from(value(3))).abs() < 1e-10);
+        // Floats need no scale.
+        if k < 3 {
+            let meters = ground(&PLAIN.replace("height_scale = 2.0\n", ""), folder.path());
+            assert!((pixels(&meters)[3] - 0.1 * f64::from(value(3))).abs() < 1e-6);
+        }
     }
 }
 

@@ -41,6 +41,13 @@ fn assert_file_refused(bytes: &[u8], more: &str, parts: &[&str]) {
     assert_refused(&format!("{MAP}{more}"), folder.path(), parts);
 }
 
+/// Refusal of a heightmap that says nothing about its cells.
+fn assert_bare_file_refused(bytes: &[u8], more: &str, parts: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("f"), bytes).unwrap();
+    assert_refused(&format!("kind = \"heightmap\"\nfile = \"f\"\n{more}"), folder.path(), parts);
+}
+
 fn png(columns: u32, rows: u32, data: &[u8], color: png::ColorType) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, columns, rows);
@@ -105,8 +112,13 @@ fn missing_keys() {
     let here = Path::new("");
     assert_refused("kind = \"formula\"", here, &["s.toml:5: terrain.expression: missing"]);
     assert_refused("kind = \"heightmap\"\nspacing = 0.1", here, &["s.toml:5: terrain.file: missing"]);
-    assert_refused("kind = \"heightmap\"\nfile = \"f\"", here, &["s.toml:5: terrain.spacing: missing"]);
     assert_file_refused(&gray(5, 5), "", &["s.toml:5: terrain.height_scale: missing", "black to white"]);
+    let parts = ["s.toml:5: terrain.spacing: missing; a PNG image does not tell it", "0.001 to 10 m"];
+    assert_bare_file_refused(&gray(5, 5), "height_scale = 0.1", &parts);
+    let integers = npy("<i2", "(5, 5)", &[0; 50]);
+    let parts = ["s.toml:5: terrain.height_scale: missing", "of int16, with values from 0 to 0", "one unit"];
+    assert_file_refused(&integers, "", &parts);
+    assert_file_refused(&integers, "member = \"a\"", &["s.toml:9: terrain.member", "a NumPy array has none"]);
 }
 
 #[test]
@@ -191,8 +203,19 @@ fn files_that_are_no_heightmaps() {
     fs::create_dir(folder.path().join("f")).unwrap();
     assert_refused(MAP, folder.path(), &["not a file"]);
     let scale = "height_scale = 1.0";
-    assert_file_refused(b"", scale, &["\"f\"", "not a format that can be read: a PNG image, an .npy array"]);
-    assert_file_refused(b"<svg/>", scale, &["not a format that can be read: a PNG image, an .npy array"]);
+    assert_file_refused(
+        b"",
+        scale,
+        &[
+            "\"f\"",
+            "an empty file; these can: a PNG image (.png), a TIFF file (.tif, .tiff), a NumPy array (.npy)",
+        ],
+    );
+    assert_file_refused(
+        b"<svg/>",
+        scale,
+        &["not a format that can be read; these can: a PNG image (.png)", "an OBJ mesh (.obj)"],
+    );
     assert_file_refused(&gray(9, 9)[..8], scale, &["not a valid PNG"]);
 }
 
@@ -236,7 +259,7 @@ fn images_without_data() {
 #[test]
 fn arrays() {
     let valid = floats((0..25).map(f64::from));
-    assert_file_refused(&npy("<f8", "(25,)", &valid), "", &["[25]", "two dimensions"]);
+    assert_file_refused(&npy("<f8", "(25,)", &valid), "", &["(25,)", "two dimensions"]);
     assert_file_refused(&npy("<f8", "(1, 5, 5)", &valid), "", &["two dimensions"]);
     assert_file_refused(&npy("<f8", "()", &valid), "", &["two dimensions"]);
     assert_file_refused(&npy("<c16", "(5, 5)", &valid.repeat(2)), "", &["c16", "floats"]);
@@ -257,6 +280,6 @@ fn arrays() {
     assert_file_refused(&with(1e300), "height_scale = 1000.0", &["height_scale"]);
     assert_file_refused(&with(f64::MAX), "height_scale = 1000.0", &["f"]);
     assert_file_refused(&npy("<f8", "(5, 5)", &floats([f64::NAN; 25])), "", &["without data"]);
-    let high = floats((0..25).map(|i| 2e4 + f64::from(i)));
+    let high = floats((0..25).map(|i| 2e4 + 0.01 * f64::from(i)));
     assert_file_refused(&npy("<f8", "(5, 5)", &high), "", &["heights must be finite and within"]);
 }

@@ -14,6 +14,7 @@ mod map;
 mod progress_line;
 mod schema;
 mod solve;
+mod terrain;
 mod validate;
 
 use std::io::ErrorKind;
@@ -31,6 +32,7 @@ Examples:
   warpgait solve hill.toml            plan it: hill.plan.npz and hill.svg
   warpgait check hill.plan.npz        recompute every law of the plan
   warpgait validate hill.plan.npz     replay the plan in MuJoCo
+  warpgait terrain show scan.npy --spacing 0.04     draw a ground before planning on it
   warpgait map hill.toml              build and judge the warp map alone
   warpgait bench table1 --quick       a few cases of the paper's Table I
   warpgait solve --help               options and examples of one command
@@ -61,6 +63,8 @@ enum Command {
     Solve(solve::SolveArguments),
     /// Build and judge the warp map of a scenario alone
     Map(map::MapArguments),
+    /// Draw a ground and say what it was taken for, or convert it
+    Terrain(terrain::TerrainArguments),
     /// Recompute every law of a plan in ambient space, on the plan's own samples
     Check(check::CheckArguments),
     /// Reproduce the paper's tables and figures, and measure beyond them
@@ -118,6 +122,7 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Schema(_) => schema::schema(console),
         Command::Solve(arguments) => solve::solve(&arguments, console),
         Command::Map(arguments) => map::map(&arguments, console),
+        Command::Terrain(arguments) => terrain::terrain(&arguments, console),
         Command::Check(arguments) => check::check(&arguments, console),
         Command::Bench(arguments) => bench::bench(arguments, console),
         Command::BenchCase(arguments) => bench::case(&arguments),

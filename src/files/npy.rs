@@ -94,7 +94,7 @@ pub fn tuple(shape: &[u64]) -> String {
 pub fn number_size(dtype: &str) -> Option<usize> {
     match dtype.trim_start_matches(['<', '>', '|', '=']) {
         "i1" | "u1" => Some(1),
-        "i2" | "u2" => Some(2),
+        "i2" | "u2" | "f2" => Some(2),
         "i4" | "u4" | "f4" => Some(4),
         "i8" | "u8" | "f8" => Some(8),
         _ => None,
@@ -119,6 +119,10 @@ pub fn numbers(dtype: &str, elements: &[u8]) -> Option<Vec<f64>> {
         "u2" => read!(u16),
         "u4" => read!(u32),
         "u8" => read!(u64),
+        "f2" => {
+            let from = if big { u16::from_be_bytes } else { u16::from_le_bytes };
+            elements.as_chunks().0.iter().map(|&bytes| half(from(bytes))).collect()
+        }
         "f4" => read!(f32),
         "f8" => read!(f64),
         _ => return None,
@@ -138,6 +142,18 @@ fn cut(text: &str) -> String {
         return text.to_owned();
     }
     text.chars().take(SHOWN).chain(['…']).collect()
+}
+
+/// The value of a float of 2 bytes (IEEE 754: a sign, 5 bits of exponent, 10 of fraction).
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
+    let size = match exponent {
+        0 => fraction * 2f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
+    };
+    if bits >> 15 == 1 { -size } else { size }
 }
 
 /// The dictionary of a header: three keys in any order, and nothing after it but space.
@@ -255,6 +271,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn half_floats_are_read() {
+        for (bits, value) in [
+            (0x0000, 0.0),
+            (0x0001, 2f64.powi(-24)),
+            (0x0400, 2f64.powi(-14)),
+            (0x3555, 0.333251953125),
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x7bff, 65504.0),
+            (0xfc00, f64::NEG_INFINITY),
+        ] {
+            assert_eq!(numbers("<f2", &u16::to_le_bytes(bits)), Some(vec![value]), "{bits:x}");
+            assert_eq!(numbers(">f2", &u16::to_be_bytes(bits)), Some(vec![value]), "{bits:x}");
+        }
+        assert!(numbers("<f2", &[0, 0x7e]).unwrap()[0].is_nan());
     }
 
     #[test]

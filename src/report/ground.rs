@@ -7,15 +7,15 @@ use crate::plan::GroundGrid;
 use crate::terrain::{ContactGround, Surfaces};
 
 /// Bands of height, each of one color.
-const BANDS: usize = 14;
+pub(super) const BANDS: usize = 14;
 /// Rows and columns of the shaded ground.
 const RASTER: usize = 180;
 /// The height scale spans at least this, so that flat ground shows no noise, m.
 const MIN_HEIGHT_RANGE: f64 = 0.1;
 /// Overlap of neighboring rectangles, which hides the seams between them, pixels.
-const OVERLAP: f64 = 0.4;
+pub(super) const OVERLAP: f64 = 0.4;
 /// Segments of a profile, about as many as pixels.
-const PROFILE: u32 = 550;
+pub(super) const PROFILE: u32 = 550;
 /// Style of what cannot be stood on.
 const CLOSED: &str = "fill=\"url(#hatching)\"";
 
@@ -86,7 +86,7 @@ fn along(
 }
 
 /// Bilinear interpolation of the ground's height, m; none outside the grid.
-fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
+pub(super) fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
     let (u, v) = ((x - ground.origin[0]) / ground.spacing[0], (y - ground.origin[1]) / ground.spacing[1]);
     let (most_u, most_v) = ((ground.columns - 1) as f64, (ground.rows - 1) as f64);
     if !(0.0..=most_u).contains(&u) || !(0.0..=most_v).contains(&v) {
@@ -101,14 +101,18 @@ fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
 }
 
 /// The centers of the `RASTER` × `RASTER` cells of a frame, row by row from the top.
-fn places(axes: &Axes) -> impl Iterator<Item = [f64; 2]> {
+pub(super) fn places(axes: &Axes) -> impl Iterator<Item = [f64; 2]> {
     let at = |[a, b]: [f64; 2], i: usize| a + (b - a) * (i as f64 + 0.5) / RASTER as f64;
     let (x, y) = (axes.x, axes.y);
     (0..RASTER).rev().flat_map(move |j| (0..RASTER).map(move |i| [at(x, i), at(y, j)]))
 }
 
 /// The cells of a frame that are `inside`, as few rectangles: runs along a row, and equal rows together.
-fn runs([left, top, width, height]: [f64; 4], overlap: f64, inside: impl Fn(usize) -> bool) -> Vec<[f64; 4]> {
+pub(super) fn runs(
+    [left, top, width, height]: [f64; 4],
+    overlap: f64,
+    inside: impl Fn(usize) -> bool,
+) -> Vec<[f64; 4]> {
     let cells: Vec<bool> = (0..RASTER * RASTER).map(inside).collect();
     let (cell_width, cell_height) = (width / RASTER as f64, height / RASTER as f64);
     let (mut rectangles, mut row) = (Vec::new(), 0);
@@ -132,27 +136,27 @@ fn runs([left, top, width, height]: [f64; 4], overlap: f64, inside: impl Fn(usiz
 }
 
 /// Heights over a frame, and the range that their colors span.
-struct Shades {
+pub(super) struct Shades {
     heights: Vec<Option<f64>>,
     low: f64,
     high: f64,
 }
 
 impl Shades {
-    fn over(axes: &Axes, ground: &GroundGrid) -> Self {
+    pub fn over(axes: &Axes, ground: &GroundGrid) -> Self {
         let heights: Vec<Option<f64>> = places(axes).map(|[x, y]| height(ground, x, y)).collect();
         let [low, high] = range(heights.iter().flatten().copied(), 0.0);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).max(MIN_HEIGHT_RANGE));
         Self { heights, low: middle - half, high: middle + half }
     }
 
-    fn band(&self, cell: usize) -> Option<usize> {
+    pub fn band(&self, cell: usize) -> Option<usize> {
         let part = |h: f64| (h - self.low) / (self.high - self.low);
         self.heights[cell].map(|h| ((part(h) * BANDS as f64) as usize).min(BANDS - 1))
     }
 
     /// The scale of heights, right of the frame.
-    fn scale(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
+    pub fn scale(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
         let (x, step) = (left + width + 8.0, height / BANDS as f64);
         for band in 0..BANDS {
             let y = top + height - (band + 1) as f64 * step;
@@ -165,7 +169,7 @@ impl Shades {
 }
 
 /// From pale blue (low) over sand to brown (high), light enough for paths to stand out.
-fn band_style(band: usize) -> String {
+pub(super) fn band_style(band: usize) -> String {
     const STOPS: [[f64; 3]; 3] = [[206.0, 222.0, 234.0], [243.0, 238.0, 222.0], [196.0, 160.0, 118.0]];
     format!("fill=\"{}\"", ramp(&STOPS, (band as f64 + 0.5) / BANDS as f64))
 }

@@ -7,7 +7,9 @@ mod residuals;
 mod sheet;
 pub(crate) mod svg;
 pub mod table;
+mod terrain;
 
 pub use residuals::residuals;
 pub use sheet::sheet;
 pub use table::{check_counts, check_table, derivative_table, map_table, number, violation_table};
+pub use terrain::{TerrainView, terrain_sheet};

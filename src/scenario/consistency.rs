@@ -7,7 +7,7 @@ use super::format::{Formulation, Scenario};
 use super::gait::GaitKind;
 use super::map::MapMethod;
 use super::motion::Law;
-use super::terrain::{HeightmapSpec, TerrainSpec};
+use super::terrain::TerrainSpec;
 use crate::Result;
 use crate::input::{Document, closest};
 use crate::robot::Robot;
@@ -62,14 +62,8 @@ fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
         return Err(document.error("terrain.extent", what));
     }
     if let TerrainSpec::Heightmap(spec) = &scenario.terrain
-        && spec.smoothing(scenario.footholds()) > spec.smoothing_limit()
+        && let Some(what) = spec.spacing.and_then(|spacing| spec.excess_of_smoothing(spacing))
     {
-        let what = format!(
-            "given {}, allowed: at most {} m, {} times terrain.spacing",
-            spec.smoothing(scenario.footholds()),
-            spec.smoothing_limit(),
-            HeightmapSpec::SMOOTHING_LIMIT
-        );
         return Err(document.error("terrain.smoothing", what));
     }
     Ok(())

@@ -24,7 +24,7 @@ pub enum TerrainSpec {
     Pit(PitSpec),
     /// An expression in x and y.
     Formula(FormulaSpec),
-    /// A height image (PNG) or array (`.npy`).
+    /// Heights in a file: an image, an array, a grid, a mesh.
     Heightmap(HeightmapSpec),
 }
 
@@ -277,27 +277,84 @@ pub struct FormulaSpec {
     pub domain: Domain,
 }
 
-/// `kind = "heightmap"`.
+/// Which way the indices of a heightmap a[i, j] run, i the first (the row in a file), j the second (the column).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// As one looks at a picture: i against y, j along x; a[0, 0] has the least x and the largest y.
+    #[default]
+    Picture,
+    /// As NumPy's `meshgrid` and MuJoCo have it: i along y, j along x; a[0, 0] has the least x and y.
+    YUp,
+    /// As Isaac Gym has it: i along x, j along y; a[0, 0] has the least x and y.
+    XY,
+    /// As ETH's `grid_map` has it: i against x, j against y; a[0, 0] has the largest x and y.
+    GridMap,
+}
+
+impl Layout {
+    /// Its name in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            Layout::Picture => "picture",
+            Layout::YUp => "y-up",
+            Layout::XY => "x-y",
+            Layout::GridMap => "grid-map",
+        }
+    }
+
+    /// Whether the first index runs along x, so that rows and columns change places.
+    pub fn first_is_x(self) -> bool {
+        matches!(self, Layout::XY | Layout::GridMap)
+    }
+}
+
+/// A number, or several.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Numbers {
+    /// One.
+    One(f64),
+    /// Any number of them.
+    Many(Vec<f64>),
+}
+
+impl Numbers {
+    /// All of them.
+    pub fn as_slice(&self) -> &[f64] {
+        match self {
+            Numbers::One(number) => std::slice::from_ref(number),
+            Numbers::Many(numbers) => numbers,
+        }
+    }
+}
+
+/// `kind = "heightmap"`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(inline)]
 pub struct HeightmapSpec {
-    /// PNG image or `.npy` array, relative to the scenario.
+    /// The file, relative to the scenario; `docs/inputs.md` lists the formats.
     pub file: String,
-    /// Distance between neighboring cells, m.
+    /// What to take from a file with several members: an array of an `.npz`, an `<hfield>` of an MJCF file. Default: the only one.
+    pub member: Option<String>,
+    /// Which way the indices run. Default: what the file tells; `picture` for images, `.npy` and text.
+    pub layout: Option<Layout>,
+    /// Distance between neighboring cells, m; default: that of the file. Required if the file tells none.
     #[schemars(range(min = 0.001, max = 10.0))]
-    pub spacing: f64,
-    /// Image: height from black to white, m; required. Array: factor that converts to m; default 1.
+    pub spacing: Option<f64>,
+    /// Image: height from black to white, m; required. Integers: height of one unit, m; required. Floats: factor that converts to m; default 1.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub height_scale: Option<f64>,
+    /// Values, as stored in the file, that stand for no data; in addition to NaN and to what the file tells.
+    pub no_data: Option<Numbers>,
     /// Standard deviation of the smoothing, m; at most 50 cells. Default with `contact.footholds = "patches"`: 0; else 1.5 cells or
     /// 0.03 m, whichever is larger.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub smoothing: Option<f64>,
-    /// x, y of the center of the file, m.
-    #[serde(default)]
+    /// x, y of the center of the file, m; default: what the file tells, else 0, 0.
     #[schemars(inner(range(min = -1e5, max = 1e5)))]
-    pub origin: [f64; 2],
+    pub origin: Option<[f64; 2]>,
     /// x_min, x_max, y_min, y_max of the part to use, m; default: all of the file.
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub extent: Option<[f64; 4]>,
@@ -311,17 +368,21 @@ impl HeightmapSpec {
     /// Smoothing over more cells than this is refused; it would take minutes.
     pub const SMOOTHING_LIMIT: f64 = 50.0;
 
-    /// Largest smoothing allowed, m.
-    pub fn smoothing_limit(&self) -> f64 {
-        Self::SMOOTHING_LIMIT * self.spacing
-    }
-
-    /// Standard deviation of the smoothing, m.
-    pub fn smoothing(&self, footholds: Footholds) -> f64 {
+    /// Standard deviation of the smoothing of cells of a spacing, m.
+    pub fn smoothing(&self, footholds: Footholds, spacing: f64) -> f64 {
         let default = match footholds {
             Footholds::Patches => 0.0,
-            Footholds::Anywhere => (Self::SMOOTHING_CELLS * self.spacing).max(Self::SMOOTHING_LENGTH),
+            Footholds::Anywhere => (Self::SMOOTHING_CELLS * spacing).max(Self::SMOOTHING_LENGTH),
         };
-        self.smoothing.unwrap_or(default.min(self.smoothing_limit()))
+        self.smoothing.unwrap_or(default.min(Self::SMOOTHING_LIMIT * spacing))
+    }
+
+    /// What is wrong with a smoothing that is given, for cells of a spacing.
+    pub fn excess_of_smoothing(&self, spacing: f64) -> Option<String> {
+        let (given, most) = (self.smoothing?, Self::SMOOTHING_LIMIT * spacing);
+        let limit = Self::SMOOTHING_LIMIT;
+        (given > most).then(|| {
+            format!("given {given}, allowed: at most {most} m, {limit} times the spacing of the cells")
+        })
     }
 }

@@ -208,15 +208,23 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             vec!["s.toml:3: terrain.expression: missing; kind = \"formula\" needs it: a string"],
         ),
         (
-            with("kind = \"rippled\"", "kind = \"heightmap\"\nfile = \"h.png\""),
-            vec!["s.toml:3: terrain.spacing: missing; kind = \"heightmap\" needs it: a finite number"],
+            with("kind = \"rippled\"", "kind = \"heightmap\"\nspacing = 0.1"),
+            vec!["s.toml:3: terrain.file: missing; kind = \"heightmap\" needs it: a string"],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"heightmap\"\nfile = \"h.png\"\nlayout = \"yup\""),
+            vec!["s.toml:6: terrain.layout: given \"yup\"", "\"picture\", \"y-up\", \"x-y\", \"grid-map\""],
+        ),
+        (
+            with("kind = \"rippled\"", "kind = \"heightmap\"\nfile = \"h.png\"\nno_data = \"none\""),
+            vec!["s.toml:6: terrain.no_data: given \"none\"", "a finite number, or an array"],
         ),
         (
             with(
                 "kind = \"rippled\"",
                 "kind = \"heightmap\"\nfile = \"h.png\"\nspacing = 0.01\nsmoothing = 1",
             ),
-            vec!["s.toml:7: terrain.smoothing: given 1, allowed: at most 0.5 m, 50 times terrain.spacing"],
+            vec!["s.toml:7: terrain.smoothing: given 1, allowed: at most 0.5 m, 50 times the spacing"],
         ),
         (
             with(

@@ -1,38 +1,94 @@
-//! `kind = "heightmap"`: reads a file of heights in one of the [`FORMATS`] and places it in the world.
+//! `kind = "heightmap"`: reads a file of heights in one of the [formats](super::formats) and places it in the world.
 
-use std::fs;
 use std::path::Path;
 
+use serde::Serialize;
+
+use super::file::read_file;
+use super::formats::{self, Input};
 use super::ground::Ground;
-use super::raster::Raster;
+use super::placing::{Placed, place};
+use super::raster::{Raster, Values};
 use super::scan::{self, Scan};
-use super::{image, npy};
+use super::suspect;
 use crate::digest::sha256_hex;
 use crate::error::{Error, Result};
-use crate::heightfield::Grid;
 use crate::scenario::Footholds;
 use crate::scenario::terrain::HeightmapSpec;
 
-/// Larger files are refused unread, bytes.
-const MAX_FILE: u64 = 512 << 20;
-
-/// A file format of heightmaps.
-struct Format {
-    /// In messages.
-    name: &'static str,
-    /// The first bytes of every such file.
-    signature: &'static [u8],
-    /// Decodes a file.
-    decode: fn(&[u8]) -> Result<Raster>,
-    /// `terrain.height_scale` where the scenario gives none; none if the format needs it.
-    height_scale: Option<f64>,
+/// Heights as measured, in the world, and what their file was taken for.
+pub struct Heightmap {
+    /// The heights, NaN where there is no data.
+    pub scan: Scan,
+    /// What the file was taken for.
+    pub source: Source,
+    /// Name as given in the scenario and SHA-256 (hexadecimal) of each file read.
+    pub inputs: Vec<(String, String)>,
 }
 
-/// The file formats. A new one is a reader in a file of its own, which returns a [`Raster`], and an entry here.
-const FORMATS: [Format; 2] = [
-    Format { name: "a PNG image", signature: image::SIGNATURE, decode: image::decode, height_scale: None },
-    Format { name: "an .npy array", signature: npy::SIGNATURE, decode: npy::decode, height_scale: Some(1.0) },
-];
+/// What a file of heights was taken for.
+#[derive(Clone, Debug, Serialize)]
+pub struct Source {
+    /// Its name, as given.
+    pub file: String,
+    /// Its format, with an article.
+    pub format: &'static str,
+    /// The type of a value in the file.
+    pub value_type: String,
+    /// Which way its indices run.
+    pub layout: &'static str,
+    /// How many cells there are along its first and second index.
+    pub shape: [usize; 2],
+    /// Height of one unit of the file's values, m.
+    pub unit: f64,
+    /// Cells without data.
+    pub unknown: usize,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// Reads the file of a heightmap.
+///
+/// # Errors
+/// [`Error::Key`] for files that cannot be read or decoded, missing keys, and heights that cannot be meant.
+pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
+    let name = &spec.file;
+    let located = |e: Error| match e {
+        Error::Key { .. } => e,
+        other => Error::key("terrain.file", format!("{name:?}: {other}")),
+    };
+    let path = base_dir.join(name);
+    let bytes = read_file(&path).map_err(located)?;
+    let input = Input { bytes: &bytes, path: &path, member: spec.member.as_deref(), spacing: spec.spacing };
+    let format = formats::recognize(&input).map_err(located)?;
+    let mut raster = (format.decode)(&input).map_err(located)?;
+    drop_no_data(&mut raster, spec);
+    let unit = unit(&raster, spec, format.name)?;
+    let shape = [raster.rows, raster.columns];
+    let layout = spec.layout.unwrap_or(raster.layout);
+    let value_type = std::mem::take(&mut raster.value_type);
+    let mut inputs = vec![(name.clone(), sha256_hex(&bytes))];
+    inputs.append(&mut raster.inputs);
+
+    let stored = raster.values.clone();
+    for value in &mut raster.values {
+        *value *= unit;
+    }
+    let Placed { scan, notes } = place(raster, spec, layout, format.name)?;
+    let [x_min, x_max, y_min, y_max] = scan.grid.extent();
+    let suspicion = suspect::check(&stored, unit, (x_max - x_min).hypot(y_max - y_min)).map_err(located)?;
+    let source = Source {
+        file: name.clone(),
+        format: format.name,
+        value_type,
+        layout: layout.name(),
+        shape,
+        unit,
+        unknown: scan.heights.iter().filter(|h| h.is_nan()).count(),
+        notes: notes.into_iter().chain(suspicion).collect(),
+    };
+    Ok(Heightmap { scan, source, inputs })
+}
 
 /// The ground of a heightmap.
 ///
@@ -44,44 +100,47 @@ pub fn ground(
     footholds: Footholds,
     base_dir: &Path,
 ) -> Result<Ground> {
-    let name = &spec.file;
-    let refuse = |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{name:?}: {what}"));
-    let bytes = read(&base_dir.join(name)).map_err(|what| refuse(&what))?;
-    let Some(format) = FORMATS.iter().find(|format| bytes.starts_with(format.signature)) else {
-        let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
-        return Err(refuse(&format!("not a format that can be read: {}", names.join(", "))));
-    };
-    let Some(scale) = spec.height_scale.or(format.height_scale) else {
-        let what = format!("missing; {} needs it: the height in m from black to white", format.name);
-        return Err(Error::key("terrain.height_scale", what));
-    };
-    let Raster { columns, rows, values } = (format.decode)(&bytes).map_err(|e| refuse(&e))?;
-
-    let half = |count: usize| 0.5 * spec.spacing * (count - 1) as f64;
-    let grid = Grid {
-        origin: [spec.origin[0] - half(columns), spec.origin[1] - half(rows)],
-        spacing: [spec.spacing; 2],
-        columns,
-        rows,
-    };
-    // Flipped: the first row of the file has the largest y.
-    let heights: Vec<f64> = values.chunks_exact(columns).rev().flatten().map(|v| v * scale).collect();
-    let mut ground = scan::ground(kind, spec, footholds, Scan { grid, heights })?;
-    ground.inputs.push((name.clone(), sha256_hex(&bytes)));
+    let Heightmap { scan, source, inputs } = read(spec, base_dir)?;
+    if let Some(what) = spec.excess_of_smoothing(scan.grid.spacing[0]) {
+        return Err(Error::key("terrain.smoothing", what));
+    }
+    let mut ground = scan::ground(kind, spec, footholds, scan)?;
+    ground.inputs.extend(inputs);
+    ground.report.notes.splice(0..0, source.notes);
     Ok(ground)
 }
 
-/// The content of a file, or why it cannot be read.
-fn read(path: &Path) -> std::result::Result<Vec<u8>, String> {
-    let complain = |what: &dyn std::fmt::Display| {
-        format!("{what} (looked for {}; relative paths start at the scenario's folder)", path.display())
+/// Replaces values that stand for no data by NaN.
+fn drop_no_data(raster: &mut Raster, spec: &HeightmapSpec) {
+    let given = spec.no_data.as_ref().map_or(&[][..], |numbers| numbers.as_slice());
+    let all: Vec<f64> = given.iter().chain(&raster.no_data).copied().collect();
+    if all.is_empty() {
+        return;
+    }
+    // Files with floats of 4 bytes hold what is nearest to the number that a user writes.
+    let single = raster.value_type == "float32";
+    let stands_for_none = |v: f64| all.iter().any(|&n| v == n || (single && v as f32 == n as f32));
+    for value in raster.values.iter_mut().filter(|v| stands_for_none(**v)) {
+        *value = f64::NAN;
+    }
+}
+
+/// Height of one unit of the values, m.
+fn unit(raster: &Raster, spec: &HeightmapSpec, format: &str) -> Result<f64> {
+    let needed = |what: &str| {
+        let refusal = || Error::key("terrain.height_scale", format!("missing; {format} needs it: {what}"));
+        spec.height_scale.ok_or_else(refusal)
     };
-    let about = fs::metadata(path).map_err(|e| complain(&e))?;
-    if !about.is_file() {
-        return Err(complain(&"not a file"));
-    }
-    if about.len() > MAX_FILE {
-        return Err(complain(&format!("{} bytes are too many; at most {MAX_FILE}", about.len())));
-    }
-    fs::read(path).map_err(|e| complain(&e))
+    Ok(match raster.meaning {
+        Values::Meters => spec.height_scale.unwrap_or(1.0),
+        Values::Levels { white } => needed("the height in m from black to white")? / white,
+        Values::Normalized => needed("the height in m from the least to the greatest value")?,
+        Values::Integers => {
+            let (low, high) = super::raster::range(&raster.values);
+            needed(&format!(
+                "of {}, with values from {low} to {high}, the height in m of one unit",
+                raster.value_type
+            ))?
+        }
+    })
 }

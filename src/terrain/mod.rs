@@ -2,23 +2,25 @@
 //!
 //! Every kind ends as a [`Ground`]: a heightfield, and a report on how well it represents its source. To add a kind that is a
 //! function of x and y, add a variant to `scenario/terrain.rs` and a line to [`build`]. To add a file format, add a reader
-//! and a line to `FORMATS` in `heightmap.rs`.
+//! and an entry to `FORMATS` in `formats/mod.rs`.
 
 mod analytic;
 mod contact;
+mod file;
 mod fill;
+mod formats;
 mod formula;
 mod function;
 mod ground;
 mod heightmap;
-mod image;
 mod morphology;
-mod npy;
 mod patch;
+mod placing;
 mod raster;
 mod scan;
 mod smooth;
 mod surfaces;
+mod suspect;
 
 use std::path::Path;
 
@@ -27,7 +29,9 @@ use crate::scenario::{Scenario, TerrainSpec};
 pub use contact::{ContactGround, FootNeeds};
 use formula::Formula;
 pub use ground::{Ground, GroundReport};
+pub use heightmap::{Heightmap, Source, read as read_heightmap};
 pub use patch::Patch;
+pub use scan::Scan;
 pub use surfaces::Surfaces;
 
 /// Builds the ground that a scenario specifies; its relative paths start at `base_dir`. Assumes that the ranges of

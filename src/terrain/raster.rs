@@ -4,20 +4,72 @@
 
 use crate::error::{Error, Result};
 use crate::heightfield::MAX_SAMPLES;
+use crate::scenario::terrain::Layout;
 
 /// Rasters with a shorter side are refused: a spline needs four samples.
 const MIN_SIDE: u64 = 4;
 /// Larger rasters are refused before they are decoded, cells.
 const MAX_CELLS: u64 = MAX_SAMPLES as u64;
 
-/// Values as stored in a file: row 0, the first, has the largest y; NaN = no data.
+/// Heights as stored in a file, and what the file says about them.
 pub struct Raster {
-    /// Cells along x.
+    /// Cells along the second index, j.
     pub columns: usize,
-    /// Cells along y.
+    /// Cells along the first index, i.
     pub rows: usize,
-    /// (rows, columns)
+    /// (rows, columns), NaN = no data.
     pub values: Vec<f64>,
+    /// What a value means.
+    pub meaning: Values,
+    /// The type of a value, in messages.
+    pub value_type: String,
+    /// Which way i and j run, unless the scenario says otherwise.
+    pub layout: Layout,
+    /// Distance between neighboring cells along x and y, m, if the file tells.
+    pub spacing: Option<[f64; 2]>,
+    /// x, y of the cell with the least x and y, m, if the file tells.
+    pub corner: Option<[f64; 2]>,
+    /// Values that stand for no data, according to the file.
+    pub no_data: Vec<f64>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+    /// Other files that were read: name and SHA-256 (hexadecimal).
+    pub inputs: Vec<(String, String)>,
+}
+
+/// What a value of a raster means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Values {
+    /// A height in m; `terrain.height_scale` may change the unit.
+    Meters,
+    /// A height in a unit that only `terrain.height_scale` tells.
+    Integers,
+    /// A gray level from 0; `terrain.height_scale` is the height of white.
+    Levels {
+        /// The greatest level.
+        white: f64,
+    },
+    /// A fraction from 0 to 1; `terrain.height_scale` is the height of 1.
+    Normalized,
+}
+
+impl Raster {
+    /// A raster stored like a picture, of which the file says nothing else.
+    pub fn new(columns: usize, rows: usize, values: Vec<f64>, meaning: Values, value_type: String) -> Self {
+        Self {
+            columns,
+            rows,
+            values,
+            meaning,
+            value_type,
+            layout: Layout::Picture,
+            spacing: None,
+            corner: None,
+            no_data: Vec::new(),
+            notes: Vec::new(),
+            inputs: Vec::new(),
+        }
+    }
 }
 
 /// Refuses rasters that are too small or too large, from their header alone.

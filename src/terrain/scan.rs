@@ -34,7 +34,7 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, sc
     let Scan { grid, heights: measured } = scan;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
-    let smoothing = spec.smoothing(footholds);
+    let smoothing = spec.smoothing(footholds, spacing);
 
     let mut filled = measured.clone();
     fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;

@@ -1,5 +1,7 @@
 //! Motions and hand-made plans for the tests.
 
+pub mod inputs;
+
 use std::ops::ControlFlow;
 
 use warpgait::heightfield::Heightfield;

@@ -1,8 +1,9 @@
 //! Heights in a NumPy `.npy` file.
 
-use super::raster::{Raster, check_size};
+use super::Input;
 use crate::error::{Error, Result};
 use crate::files::npy::{self, Header};
+use crate::terrain::raster::{Raster, Values, check_size};
 
 pub use crate::files::npy::SIGNATURE;
 
@@ -10,19 +11,28 @@ pub use crate::files::npy::SIGNATURE;
 ///
 /// # Errors
 /// If the bytes are not a valid array of this kind, it is too small or too large, or an element is infinite.
-pub fn decode(bytes: &[u8]) -> Result<Raster> {
+pub fn decode(input: &Input) -> Result<Raster> {
+    array(input.bytes)
+}
+
+/// As [`decode`], for an array anywhere.
+///
+/// # Errors
+/// Those of [`decode`].
+pub fn array(bytes: &[u8]) -> Result<Raster> {
     let complain = |what| Error::input(format!("not a valid .npy array: {what}"));
     let (header, data) = Header::read(bytes).map_err(complain)?;
     let Header { dtype, fortran_order, shape } = &header;
     let &[rows, columns] = &shape[..] else {
         return Err(Error::input(format!(
-            "an array of shape {shape:?}; it must have two dimensions, rows and columns"
+            "an array of shape {}; it must have two dimensions, rows and columns",
+            npy::tuple(shape)
         )));
     };
     check_size(columns, rows)?;
     let (columns, rows) = (columns as usize, rows as usize);
     let unsupported = || {
-        Error::input(format!("an array of type {dtype}; it must hold floats of 4 or 8 bytes, or integers"))
+        Error::input(format!("an array of type {dtype}; it must hold floats of 2, 4 or 8 bytes, or integers"))
     };
     let width = npy::number_size(dtype).ok_or_else(unsupported)?;
     let data = data.get(..columns * rows * width).ok_or_else(|| {
@@ -36,10 +46,15 @@ pub fn decode(bytes: &[u8]) -> Result<Raster> {
             stored[i]
         )));
     }
-    let values = if *fortran_order {
+    let stored = if *fortran_order {
         (0..columns * rows).map(|i| stored[(i % columns) * rows + i / columns]).collect()
     } else {
         stored
     };
-    Ok(Raster { columns, rows, values })
+    let (kind, values) = match dtype.trim_start_matches(['<', '>', '|', '=']).split_at(1) {
+        ("f", _) => ("float", Values::Meters),
+        ("u", _) => ("uint", Values::Integers),
+        _ => ("int", Values::Integers),
+    };
+    Ok(Raster::new(columns, rows, stored, values, format!("{kind}{}", 8 * width)))
 }

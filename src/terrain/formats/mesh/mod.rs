@@ -1,0 +1,106 @@
+//! Triangle meshes (OBJ, STL, PLY), z up, in m: heights by vertical rays from above.
+
+mod obj;
+mod ply;
+mod rays;
+mod stl;
+
+use super::Input;
+use crate::error::{Error, Result};
+use crate::terrain::raster::{Raster, Values, check_size};
+
+pub use obj::is_obj;
+pub use ply::SIGNATURE as PLY_SIGNATURE;
+pub use stl::is_stl;
+
+/// Larger meshes are refused, triangles.
+const MOST_TRIANGLES: usize = 4_000_000;
+/// Rays times the triangles that they meet; more would take minutes.
+const MOST_HITS: f64 = 3e8;
+
+/// Corners of the triangles of a mesh, m.
+type Triangles = Vec<[[f64; 3]; 3]>;
+
+/// Decodes an OBJ file.
+///
+/// # Errors
+/// Those of the reader and of [`heights`].
+pub fn obj(input: &Input) -> Result<Raster> {
+    heights(obj::triangles(input.bytes)?, input)
+}
+
+/// Decodes an STL file, binary or in text.
+///
+/// # Errors
+/// Those of the reader and of [`heights`].
+pub fn stl(input: &Input) -> Result<Raster> {
+    heights(stl::triangles(input.bytes)?, input)
+}
+
+/// Decodes a PLY file, binary or in text.
+///
+/// # Errors
+/// Those of the reader and of [`heights`].
+pub fn ply(input: &Input) -> Result<Raster> {
+    heights(ply::triangles(input.bytes)?, input)
+}
+
+/// Refuses to hold more triangles.
+fn ensure_few(triangles: usize) -> Result<()> {
+    if triangles <= MOST_TRIANGLES {
+        return Ok(());
+    }
+    let what = format!("over {MOST_TRIANGLES} triangles are too many; simplify the mesh, or cut out a part");
+    Err(Error::input(what))
+}
+
+/// The heights of the highest surfaces over a grid of `terrain.spacing` that starts at the mesh's least x and y.
+fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
+    if triangles.is_empty() {
+        return Err(Error::input("a mesh without faces"));
+    }
+    if triangles.iter().flatten().flatten().any(|v| !v.is_finite()) {
+        return Err(Error::input("a mesh with a vertex that is not finite"));
+    }
+    let bounds: [[f64; 2]; 3] = std::array::from_fn(|axis| {
+        let along = || triangles.iter().flatten().map(|vertex| vertex[axis]);
+        [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)]
+    });
+    let [x, y, z] = bounds.map(|[low, high]| high - low);
+    let size = format!("a mesh of {x:.3} x {y:.3} x {z:.3} m along x, y, z (z is up)");
+    let Some(spacing) = input.spacing else {
+        let what =
+            format!("missing; {size} needs it: the distance between neighboring rays in m, such as 0.02");
+        return Err(Error::key("terrain.spacing", what));
+    };
+    // A remainder of less than a cell is left out.
+    let count = |length: f64| (length / spacing + rays::SEAM).floor().min(1e12) as u64 + 1;
+    let (columns, rows) = (count(x), count(y));
+    check_size(columns, rows)
+        .map_err(|e| Error::key("terrain.spacing", format!("given {spacing}: {size}: {e}")))?;
+    let grid = rays::Rays {
+        corner: [bounds[0][0], bounds[1][0]],
+        spacing,
+        columns: columns as usize,
+        rows: rows as usize,
+    };
+    if grid.work(&triangles) > MOST_HITS {
+        let what = format!(
+            "given {spacing}: {size} has too many layers of faces for so many rays; allowed: a larger one"
+        );
+        return Err(Error::key("terrain.spacing", what));
+    }
+    let seen = grid.cast(&triangles);
+    let mut raster = Raster::new(
+        grid.columns,
+        grid.rows,
+        seen.heights,
+        Values::Meters,
+        format!("{} triangles", triangles.len()),
+    );
+    raster.layout = crate::scenario::terrain::Layout::YUp;
+    raster.spacing = Some([spacing; 2]);
+    raster.corner = Some(grid.corner);
+    raster.notes = seen.notes;
+    Ok(raster)
+}
