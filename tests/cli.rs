@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::common;
 use serde_json::Value;
 
-fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+pub fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
     let output =
         Command::new(env!("CARGO_BIN_EXE_warpgait")).current_dir(folder).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
@@ -14,7 +14,7 @@ fn warpgait(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
 }
 
 /// Bad input: exit code 2, nothing on standard output, one line on standard error that contains all `parts`.
-fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+pub fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
     let before = files(folder);
     let (code, out, err) = warpgait(folder, arguments);
     assert_eq!(code, 2, "{arguments:?}: {out}{err}");
@@ -43,6 +43,10 @@ fn help_and_usage() {
     assert_eq!(warpgait(folder.path(), &[]).0, 2);
     assert_eq!(warpgait(folder.path(), &["chekc"]).0, 2);
     assert_eq!(warpgait(folder.path(), &["check"]).0, 2);
+    for command in ["show", "convert"] {
+        let (code, out, _) = warpgait(folder.path(), &["terrain", command, "--help"]);
+        assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
+    }
     for command in ["init", "schema", "solve", "map", "check", "bench", "validate"] {
         let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");

@@ -2,38 +2,10 @@
 
 use std::fs;
 
+use crate::common::files::*;
 use crate::common::inputs::*;
 use proptest::prelude::*;
-use warpgait::files::npz::NpzWriter;
 use warpgait::heightfield::Grid;
-
-/// A file with this content in a folder of its own, and the ground that it is.
-fn ground_of(name: &str, content: &[u8], keys: &str) -> warpgait::terrain::Ground {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join(name), content).unwrap();
-    ground(&format!("file = \"{name}\"\n{keys}"), folder.path())
-}
-
-fn has_note(ground: &warpgait::terrain::Ground, part: &str) -> bool {
-    ground.report.notes.iter().any(|note| note.contains(part))
-}
-
-/// An archive with these members.
-fn npz(members: &[(&str, &[usize], &[f64])], layout: Option<&str>) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.npz");
-    let mut npz = NpzWriter::create(&path).unwrap();
-    for (name, shape, values) in members {
-        npz.add_f64(name, shape, values.iter().copied()).unwrap();
-    }
-    if let Some(layout) = layout {
-        npz.add_str("layout", &[], &[layout.to_owned()]).unwrap();
-    }
-    npz.finish().unwrap();
-    fs::read(path).unwrap()
-}
-
-const CORNER: [f64; 2] = [2.0 - 3.0 * SPACING, 1.0 - 2.0 * SPACING];
 
 #[test]
 fn archives_tell_spacing_origin_and_layout() {
@@ -184,64 +156,6 @@ fn esri_grids_tell_their_place() {
     }
 }
 
-/// A TIFF file of one strip, little endian: its tags with type, count and value, and the samples.
-fn tiff(tags: &[(u16, u16, Vec<u8>)], samples: &[u8]) -> Vec<u8> {
-    let mut tags = tags.to_vec();
-    let long = |v: usize| (v as u32).to_le_bytes().to_vec();
-    tags.push((273, 4, long(0)));
-    tags.push((279, 4, long(samples.len())));
-    tags.sort();
-    let width = |kind: u16| match kind {
-        3 => 2,
-        4 => 4,
-        12 => 8,
-        _ => 1,
-    };
-    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
-    bytes.extend((tags.len() as u16).to_le_bytes());
-    let after = 8 + 2 + 12 * tags.len() + 4;
-    let outside: usize = tags.iter().map(|(.., v)| if v.len() > 4 { v.len() } else { 0 }).sum();
-    let mut at = after;
-    let mut values = Vec::new();
-    for (tag, kind, value) in &tags {
-        let value = if *tag == 273 { long(after + outside) } else { value.clone() };
-        bytes.extend(tag.to_le_bytes());
-        bytes.extend(kind.to_le_bytes());
-        bytes.extend(((value.len() / width(*kind)) as u32).to_le_bytes());
-        if value.len() > 4 {
-            bytes.extend((at as u32).to_le_bytes());
-            at += value.len();
-            values.extend(value);
-        } else {
-            bytes.extend(value.iter().copied().chain([0; 4]).take(4));
-        }
-    }
-    bytes.extend([0; 4]);
-    [bytes, values, samples.to_vec()].concat()
-}
-
-fn short(v: u16) -> Vec<u8> {
-    v.to_le_bytes().to_vec()
-}
-
-fn doubles(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
-}
-
-/// The tags of a gray image of `COLUMNS` x `ROWS`; 1 are unsigned, 2 signed integers, 3 floats.
-fn gray_tags(bits: u16, format: u16) -> Vec<(u16, u16, Vec<u8>)> {
-    vec![
-        (256, 3, short(COLUMNS as u16)),
-        (257, 3, short(ROWS as u16)),
-        (258, 3, short(bits)),
-        (259, 3, short(1)),
-        (262, 3, short(1)),
-        (277, 3, short(1)),
-        (278, 3, short(ROWS as u16)),
-        (339, 3, short(format)),
-    ]
-}
-
 #[test]
 fn tiffs_hold_floats_and_integers_with_their_place() {
     let (_, values) = stored("picture");
@@ -289,12 +203,6 @@ fn tiffs_hold_floats_and_integers_with_their_place() {
     for length in (0..plain.len()).step_by(3) {
         refusal("a.tif", &plain[..length], &keys);
     }
-}
-
-/// MuJoCo's binary file.
-fn hfield(rows: i32, columns: i32, values: &[f64]) -> Vec<u8> {
-    let head = [rows.to_le_bytes(), columns.to_le_bytes()].concat();
-    [head, values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect()].concat()
 }
 
 /// The least and the greatest of `heights()`, m.
@@ -348,179 +256,6 @@ fn height_fields_of_mujoco_are_normalized_as_mujoco_does() {
     assert_refused("m.xml", deep.as_bytes(), "", &["more than 200 deep"]);
     let entities = b"<!DOCTYPE m [<!ENTITY a \"aa\"><!ENTITY b \"&a;&a;\">]><mujoco>&b;</mujoco>";
     assert_refused("m.xml", entities, "", &["not XML"]);
-}
-
-/// Vertices and faces (from 0) of the ground as a mesh whose vertices are its cells.
-fn mesh() -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
-    let vertex = |k: usize| {
-        let (i, j) = (k % COLUMNS, k / COLUMNS);
-        [CORNER[0] + SPACING * i as f64, CORNER[1] + SPACING * j as f64, height(i, j)]
-    };
-    let faces = (0..COLUMNS - 1).flat_map(|i| (0..ROWS - 1).map(move |j| j * COLUMNS + i));
-    let faces = faces.flat_map(|k| [[k, k + 1, k + COLUMNS], [k + 1, k + COLUMNS + 1, k + COLUMNS]]);
-    ((0..COLUMNS * ROWS).map(vertex).collect(), faces.collect())
-}
-
-fn obj(vertices: &[[f64; 3]], faces: &[[usize; 3]]) -> Vec<u8> {
-    let mut text = String::from("# a mesh\nmtllib none.mtl\no ground\n");
-    for [x, y, z] in vertices {
-        text += &format!("v {x} {y} {z}\n");
-    }
-    for [a, b, c] in faces {
-        text += &format!("f {}/1/1 {}/1 {}\n", a + 1, b + 1, c + 1).replace("/1/1", "").replace("/1", "");
-    }
-    text.into_bytes()
-}
-
-fn stl(vertices: &[[f64; 3]], faces: &[[usize; 3]]) -> Vec<u8> {
-    // A comment as that of a file in text, as some programs write it.
-    let mut bytes = b"solid".to_vec();
-    bytes.resize(80, b' ');
-    bytes.extend((faces.len() as u32).to_le_bytes());
-    for face in faces {
-        bytes.extend([0; 12]);
-        bytes.extend(face.iter().flat_map(|i| vertices[*i]).flat_map(|v| (v as f32).to_le_bytes()));
-        bytes.extend([0; 2]);
-    }
-    bytes
-}
-
-fn stl_text(vertices: &[[f64; 3]], faces: &[[usize; 3]]) -> Vec<u8> {
-    let mut text = String::from("solid ground\n");
-    for face in faces {
-        text += "facet normal 0 0 1\nouter loop\n";
-        for [x, y, z] in face.map(|i| vertices[i]) {
-            text += &format!("vertex {x} {y} {z}\n");
-        }
-        text += "endloop\nendfacet\n";
-    }
-    (text + "endsolid ground\n").into_bytes()
-}
-
-fn ply(vertices: &[[f64; 3]], faces: &[[usize; 3]], format: &str) -> Vec<u8> {
-    let mut bytes = format!(
-        "ply\nformat {format} 1.0\ncomment ground\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        vertices.len(),
-        faces.len()
-    )
-    .into_bytes();
-    for [x, y, z] in vertices {
-        match format {
-            "ascii" => bytes.extend(format!("{x} {y} {z} 7\n").bytes()),
-            "binary_little_endian" => bytes.extend([x, y, z].iter().flat_map(|v| v.to_le_bytes()).chain([7])),
-            _ => bytes.extend([x, y, z].iter().flat_map(|v| v.to_be_bytes()).chain([7])),
-        }
-    }
-    for face in faces {
-        let [a, b, c] = face;
-        let indices = face.map(|i| i as i32);
-        match format {
-            "ascii" => bytes.extend(format!("3 {a} {b} {c}\n").bytes()),
-            "binary_little_endian" => {
-                bytes.extend([3].into_iter().chain(indices.into_iter().flat_map(i32::to_le_bytes)))
-            }
-            _ => bytes.extend([3].into_iter().chain(indices.into_iter().flat_map(i32::to_be_bytes))),
-        }
-    }
-    bytes
-}
-
-#[test]
-fn meshes_are_seen_from_above() {
-    let (vertices, faces) = mesh();
-    let keys = format!("spacing = {SPACING}");
-    let files = [
-        ("a.obj", obj(&vertices, &faces), 1e-12),
-        ("a.stl", stl(&vertices, &faces), 1e-6),
-        ("a.stl", stl_text(&vertices, &faces), 1e-6),
-        ("a.ply", ply(&vertices, &faces, "ascii"), 1e-12),
-        ("a.ply", ply(&vertices, &faces, "binary_little_endian"), 1e-12),
-        ("a.ply", ply(&vertices, &faces, "binary_big_endian"), 1e-12),
-    ];
-    for (name, bytes, tolerance) in &files {
-        let found = ground_of(name, bytes, &format!("{keys}\norigin = [2.0, 1.0]"));
-        assert_is_the_ground(&found, [2.0, 1.0], *tolerance);
-        assert!(found.report.notes.is_empty(), "{:?}", found.report.notes);
-        let its_own = ground_of(name, bytes, &keys);
-        assert!((its_own.report.extent[0] - CORNER[0]).abs() < 1e-6);
-        assert_refused(
-            name,
-            bytes,
-            "",
-            &["s.toml:5: terrain.spacing: missing; a mesh of 0.120 x 0.080 x 0.076 m"],
-        );
-        for length in (0..bytes.len()).step_by(13) {
-            let folder = tempfile::tempdir().unwrap();
-            fs::write(folder.path().join(name), &bytes[..length]).unwrap();
-            let _ = try_ground(&format!("file = \"{name}\"\n{keys}"), folder.path());
-        }
-    }
-    let inside_out: Vec<[usize; 3]> = faces.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
-    let found = ground_of("a.obj", &obj(&vertices, &inside_out), &keys);
-    assert!(has_note(&found, "look down"), "{:?}", found.report.notes);
-    let huge = b"ply\nformat binary_little_endian 1.0\nelement vertex 3000000\nend_header\n".to_vec();
-    assert_refused("a.ply", &huge, &keys, &["3000000 elements \"vertex\" do not fit"]);
-    assert_refused("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", &keys, &["not a valid OBJ file"]);
-    assert_refused("a.obj", b"v 0 0 0\nv 1 0 0\n", &keys, &["a mesh without faces"]);
-    assert_refused("a.obj", &obj(&vertices, &faces), "spacing = 1.0", &["given 1", "too few"]);
-}
-
-/// A box from `low` to `high`: vertices and faces that look outward.
-fn solid(low: [f64; 3], high: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
-    let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] });
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    ((0..8).map(corner).collect(), faces.collect())
-}
-
-fn joined(parts: &[(Vec<[f64; 3]>, Vec<[usize; 3]>)]) -> Vec<u8> {
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for (v, f) in parts {
-        faces.extend(f.iter().map(|face| face.map(|i| i + vertices.len())));
-        vertices.extend(v);
-    }
-    obj(&vertices, &faces)
-}
-
-#[test]
-fn only_what_a_robot_could_stand_on_is_hidden_ground() {
-    let floor = solid([-1.0, -1.0, -0.1], [1.0, 1.0, 0.0]);
-    let keys = "spacing = 0.05";
-    for (height, hidden) in [(0.0, false), (-0.05, false), (0.3, true)] {
-        // A block on the floor, sunk into it, and as the top of a table.
-        let bytes = joined(&[floor.clone(), solid([-0.5, -0.5, height], [0.5, 0.5, height + 0.2])]);
-        let found = ground_of("a.obj", &bytes, keys);
-        let note = found.report.notes.iter().find(|note| note.contains("overhangs"));
-        assert_eq!(note.is_some(), hidden, "{height}: {:?}", found.report.notes);
-        assert!((found.field.height(0.0, 0.0) - height - 0.2).abs() < 1e-6);
-        if let Some(note) = note {
-            assert!(
-                note.contains("in 400 cells (25.0 %)")
-                    && note.contains("the surface at 0.500 m hides ground 0.500 m below"),
-                "{note}"
-            );
-        }
-    }
-    let sheet = |z: f64, half: f64| {
-        let corner =
-            |k: usize| [if k & 1 == 1 { half } else { -half }, if k & 2 == 2 { half } else { -half }, z];
-        ((0..4).map(corner).collect::<Vec<_>>(), vec![[0, 1, 3], [0, 3, 2]])
-    };
-    let found = ground_of("a.obj", &joined(&[sheet(0.0, 1.0), sheet(0.4, 0.3)]), keys);
-    assert!(has_note(&found, "hides ground 0.400 m below"), "{:?}", found.report.notes);
-    // Two sheets side by side leave the middle open.
-    let beside = |(mut vertices, faces): (Vec<[f64; 3]>, Vec<[usize; 3]>), x: f64| {
-        vertices.iter_mut().for_each(|v| v[0] += x);
-        (vertices, faces)
-    };
-    let found =
-        ground_of("a.obj", &joined(&[beside(sheet(0.0, 0.5), -0.62), beside(sheet(0.0, 0.5), 0.63)]), keys);
-    assert!(
-        has_note(&found, "rays from above meet no face") && found.report.holes_filled > 0,
-        "{:?}",
-        found.report.notes
-    );
 }
 
 /// One small valid file of each format, with the keys that it needs.

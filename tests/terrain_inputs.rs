@@ -41,7 +41,7 @@ fn values_that_stand_for_no_data_are_holes() {
         &keys,
         &["s.toml:7: terrain.file", "terrain.no_data = 1"],
     );
-    let parts = ["2 cells with the value -9999 lie", "terrain.no_data = -9999"];
+    let parts = ["the value -9999 (2 cells) is", "terrain.no_data = -9999"];
     assert_refused("a.npy", &floats(&shape, &values), &format!("{keys}\nno_data = 1e20"), &parts);
     let counts: Vec<i16> =
         values.iter().map(|v| if *v < -1.0 { -32768 } else { (1000.0 * v.min(0.1)) as i16 }).collect();

@@ -51,7 +51,7 @@ pub fn check(values: &[f64], unit: f64, diagonal: f64) -> Result<Option<String>>
     let marked = |o: &&Outlier| MARKS.contains(&o.value) || o.value.abs() >= HUGE;
     if let Some(outlier) = ends.iter().flatten().find(marked) {
         return Err(Error::input(format!(
-            "{}; if it {}; otherwise terrain.height_scale is wrong",
+            "{}; if it {}, otherwise terrain.height_scale is wrong",
             outlier.describe(),
             outlier.remedy()
         )));
@@ -66,7 +66,7 @@ pub fn check(values: &[f64], unit: f64, diagonal: f64) -> Result<Option<String>>
         );
         // Of two levels, either may be the one that stands for nothing.
         let why = match ends.iter().flatten().min_by_key(|o| o.cells) {
-            Some(outlier) => format!("{}; perhaps it {}, or", outlier.describe(), outlier.remedy()),
+            Some(outlier) => format!("{}; if it {}, or", outlier.describe(), outlier.remedy()),
             None => format!("values from {} to {};", shown(low), shown(high)),
         };
         return Err(Error::input(format!(
@@ -86,7 +86,7 @@ impl Outlier {
         let side = if *below { "below" } else { "above" };
         let count = if *cells == 1 { "1 cell".to_owned() } else { format!("{cells} cells") };
         format!(
-            "{count} with the value {} lie {} m {side} all others, which are within {} m",
+            "the value {} ({count}) is {} m {side} all others, which are within {} m of each other",
             shown(*value),
             shown(*jump),
             shown(*rest)
@@ -94,7 +94,7 @@ impl Outlier {
     }
 
     fn remedy(&self) -> String {
-        format!("stands for no data: set terrain.no_data = {}", shown(self.value))
+        format!("stands for no data, set terrain.no_data = {}", shown(self.value))
     }
 }
 
@@ -157,8 +157,8 @@ mod tests {
             (65535.0, "65535"),
         ] {
             let message = check(&with(mark), 1.0, 5.0).unwrap_err().to_string();
-            assert!(message.contains(&format!("set terrain.no_data = {shown};")), "{message}");
-            assert!(message.contains("1 cell with the value"), "{message}");
+            assert!(message.contains(&format!("{shown} (1 cell) is")), "{message}");
+            assert!(message.contains("(1 cell)"), "{message}");
         }
         // In units of a millimeter.
         let millimeters: Vec<f64> = with(-32.768).iter().map(|v| (1000.0 * v).round()).collect();
@@ -169,7 +169,8 @@ mod tests {
     fn other_lone_values_are_remarked_on_and_refused_out_of_proportion() {
         let remark = check(&with(-4.0), 1.0, 5.0).unwrap().unwrap();
         assert!(
-            remark.contains("-4 lie 3.9") && remark.contains("if it stands for no data: set terrain.no_data")
+            remark.contains("the value -4 (1 cell) is 3.9")
+                && remark.contains("if it stands for no data, set terrain.no_data")
         );
         let message = check(&with(-40.0), 1.0, 5.0).unwrap_err().to_string();
         assert!(

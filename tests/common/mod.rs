@@ -1,5 +1,6 @@
 //! Motions and hand-made plans for the tests.
 
+pub mod files;
 pub mod inputs;
 
 use std::ops::ControlFlow;

@@ -32,14 +32,14 @@ Exit codes: 0 written; 2 bad input, nothing written.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
-pub(in crate::cli) struct ConvertArguments {
+pub(super) struct ConvertArguments {
     #[command(flatten)]
     source: SourceArguments,
     /// The file to write: .npz, .npy, .asc or .png
     output: PathBuf,
 }
 
-pub(in crate::cli) fn convert(arguments: &ConvertArguments, console: &Console) -> Result<Ending> {
+pub(super) fn convert(arguments: &ConvertArguments, console: &Console) -> Result<Ending> {
     let (input, output) = (arguments.source.input(), &arguments.output);
     let extension = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     if !["npz", "npy", "asc", "png"].contains(&extension.as_str()) {
@@ -83,7 +83,7 @@ pub(in crate::cli) fn convert(arguments: &ConvertArguments, console: &Console) -
         let _ = write!(text, "\n{key} = {value}");
     }
     if extension == "png" {
-        let _ = write!(text, "\n# black is z = {low} m, which the image does not tell");
+        let _ = write!(text, "\n# black is z = {low:.4} m, which the image does not tell");
     }
     console.result(&text);
     console.object(&json!({

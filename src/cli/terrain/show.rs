@@ -26,7 +26,7 @@ Exit codes: 0 the ground was read; 2 bad input, nothing written.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
-pub(in crate::cli) struct ShowArguments {
+pub(super) struct ShowArguments {
     #[command(flatten)]
     source: SourceArguments,
     /// The drawing to write, an SVG file [default: NAME.terrain.svg in the working folder]
@@ -37,7 +37,7 @@ pub(in crate::cli) struct ShowArguments {
     no_plot: bool,
 }
 
-pub(in crate::cli) fn show(arguments: &ShowArguments, console: &Console) -> Result<Ending> {
+pub(super) fn show(arguments: &ShowArguments, console: &Console) -> Result<Ending> {
     let input = arguments.source.input();
     let plot = match (&arguments.output, input.file_stem()) {
         _ if arguments.no_plot => None,

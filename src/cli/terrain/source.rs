@@ -106,8 +106,12 @@ impl SourceArguments {
     fn with_options(&self, error: Error) -> Error {
         let Error::Input(message) = error else { return error };
         // What precedes the key is a place in the scenario that was made up.
-        let mut what = message.find("terrain.").map_or(message.clone(), |at| message[at..].to_owned());
-        what = what.strip_prefix("terrain.file: ").map_or(what.clone(), str::to_owned);
+        let mut what = message.find(": terrain.").map_or(message.clone(), |at| message[at + 2..].to_owned());
+        if let Some(rest) = what.strip_prefix("terrain.file: ") {
+            // The name is said once.
+            let name = format!("{:?}: ", self.input.file_name().unwrap_or_default());
+            what = rest.strip_prefix(&name).unwrap_or(rest).to_owned();
+        }
         for key in KEYS {
             let option = format!("--{}", key.replace('_', "-"));
             what = what

@@ -2,7 +2,7 @@
 //!
 //! MuJoCo brings the values to 0…1 and multiplies them by the third number of the asset's `size`, which is not in the file.
 
-use super::Input;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::scenario::terrain::Layout;
 use crate::terrain::raster::{Raster, Values, check_size, range};

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
-use super::Input;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::terrain::raster::{Raster, Values, check_size};
 
@@ -91,6 +91,7 @@ impl Pixels {
         let (least, most) = colors.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &c| (a.min(c), b.max(c)));
         if most - least > Self::GRAY * self.white {
             let (row, column) = (pixel / self.columns, pixel % self.columns);
+            let colors = colors.map(|level| level as u32);
             return Err(Error::input(format!(
                 "it is in color: pixel [row {row}, column {column}] has red, green, blue {colors:?}; heights must be gray \
                  levels, because a color map or a packing of heights into colors cannot be guessed; save the heights \

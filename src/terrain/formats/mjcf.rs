@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::{Input, hfield, image};
+use super::input::Input;
+use super::{hfield, image};
 use crate::digest::sha256_hex;
 use crate::error::{Error, Result};
 use crate::terrain::file::read_file;

@@ -1,6 +1,6 @@
 //! Heights in a NumPy `.npy` file.
 
-use super::Input;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::files::npy::{self, Header};
 use crate::terrain::raster::{Raster, Values, check_size};

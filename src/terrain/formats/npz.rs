@@ -11,7 +11,8 @@ use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::{Input, npy};
+use super::input::Input;
+use super::npy;
 use crate::error::{Error, Result};
 use crate::files::npy::{Header, number_size, numbers, tuple};
 use crate::scenario::terrain::Layout;

@@ -1,6 +1,6 @@
 //! Grids of numbers in text: comma-separated or spaced values, and ESRI ASCII grids.
 
-use super::Input;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::terrain::raster::{Raster, Values, check_size};
 

@@ -6,8 +6,8 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::Input;
 use super::image::Pixels;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::terrain::raster::{Raster, Values, check_size};
 

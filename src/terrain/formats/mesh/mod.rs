@@ -4,22 +4,19 @@ mod obj;
 mod ply;
 mod rays;
 mod stl;
+mod triangles;
 
-use super::Input;
+use super::input::Input;
 use crate::error::{Error, Result};
 use crate::terrain::raster::{Raster, Values, check_size};
+use triangles::Triangles;
 
 pub use obj::is_obj;
 pub use ply::SIGNATURE as PLY_SIGNATURE;
 pub use stl::is_stl;
 
-/// Larger meshes are refused, triangles.
-const MOST_TRIANGLES: usize = 4_000_000;
 /// Rays times the triangles that they meet; more would take minutes.
 const MOST_HITS: f64 = 3e8;
-
-/// Corners of the triangles of a mesh, m.
-type Triangles = Vec<[[f64; 3]; 3]>;
 
 /// Decodes an OBJ file.
 ///
@@ -43,15 +40,6 @@ pub fn stl(input: &Input) -> Result<Raster> {
 /// Those of the reader and of [`heights`].
 pub fn ply(input: &Input) -> Result<Raster> {
     heights(ply::triangles(input.bytes)?, input)
-}
-
-/// Refuses to hold more triangles.
-fn ensure_few(triangles: usize) -> Result<()> {
-    if triangles <= MOST_TRIANGLES {
-        return Ok(());
-    }
-    let what = format!("over {MOST_TRIANGLES} triangles are too many; simplify the mesh, or cut out a part");
-    Err(Error::input(what))
 }
 
 /// The heights of the highest surfaces over a grid of `terrain.spacing` that starts at the mesh's least x and y.

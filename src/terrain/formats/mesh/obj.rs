@@ -4,9 +4,9 @@ use std::io::Cursor;
 
 use tobj::{LoadError, LoadOptions};
 
-use super::{Triangles, ensure_few};
+use super::triangles::{Triangles, ensure_few};
 use crate::error::{Error, Result};
-use crate::terrain::formats::Input;
+use crate::terrain::formats::input::Input;
 
 /// Whether a file is called so, or has vertices in the way of an OBJ file among its first lines.
 pub fn is_obj(input: &Input) -> bool {

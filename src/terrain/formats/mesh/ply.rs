@@ -3,7 +3,7 @@
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
-use super::{MOST_TRIANGLES, Triangles, ensure_few};
+use super::triangles::{MOST_TRIANGLES, Triangles, ensure_few};
 use crate::error::{Error, Result};
 
 /// The first bytes of every PLY file.

@@ -2,9 +2,9 @@
 
 use std::io::Cursor;
 
-use super::{Triangles, ensure_few};
+use super::triangles::{Triangles, ensure_few};
 use crate::error::{Error, Result};
-use crate::terrain::formats::Input;
+use crate::terrain::formats::input::Input;
 
 /// Bytes before the triangles of a binary file: a comment, and how many they are.
 const HEADER: usize = 84;
