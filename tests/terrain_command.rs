@@ -117,7 +117,7 @@ fn what_is_converted_is_the_same_ground() {
     refused(
         folder.path(),
         &["terrain", "convert", "a.npz", "a.npz"],
-        &["a.npz: is the input, which is not replaced"],
+        &["a.npz: cannot be written: it is a.npz, which this command reads"],
     );
     refused(folder.path(), &["terrain", "convert", "a.npz", "a.tif"], &["a.tif", ".npz, .npy, .asc or .png"]);
     fs::write(folder.path().join("none.npy"), floats(&[4, 4], &[f64::NAN; 16])).unwrap();

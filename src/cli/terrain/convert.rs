@@ -11,8 +11,9 @@ use crate::cli::console::Console;
 use crate::cli::ending::Ending;
 use crate::files::npy::Header;
 use crate::files::npz::NpzWriter;
-use crate::files::{ensure_writable, write_atomically};
+use crate::files::write_atomically;
 use crate::terrain::Scan;
+use crate::visible::visible;
 use crate::{Error, Result};
 
 /// What stands for no data in an ESRI grid.
@@ -46,15 +47,7 @@ pub(super) fn convert(arguments: &ConvertArguments, console: &Console) -> Result
         let what = "cannot be written; its name must end in .npz, .npy, .asc or .png";
         return Err(Error::input(format!("{}: {what}", output.display())));
     }
-    ensure_writable(output)?;
-    let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    if same(input, output) {
-        return Err(Error::input(format!(
-            "{}: is the input, which is not replaced; name another file",
-            output.display()
-        )));
-    }
-    let scan = scan(arguments.source.read()?);
+    let scan = scan(arguments.source.read(Some(output))?);
     let (low, high) = known(&scan).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| (a.min(h), b.max(h)));
     if low > high {
         return Err(Error::input(format!("{}: every cell is without data", input.display())));
@@ -75,7 +68,7 @@ pub(super) fn convert(arguments: &ConvertArguments, console: &Console) -> Result
             keys.push(("height_scale", json!(high - low)));
         }
     }
-    let mut text = format!("Written: {}\n", output.display());
+    let mut text = format!("Written: {}\n", visible(&output.display().to_string()));
     let name = output.file_name().unwrap_or_default().to_string_lossy();
     let _ =
         write!(text, "[terrain]\nkind = \"heightmap\"\nfile = {}", toml::Value::String(name.into_owned()));

@@ -8,10 +8,11 @@ use serde_json::json;
 use super::source::{Read, SourceArguments};
 use crate::cli::console::Console;
 use crate::cli::ending::Ending;
-use crate::files::{ensure_writable, write_atomically};
+use crate::files::write_atomically;
 use crate::plan::GroundGrid;
 use crate::report::{TerrainView, number, terrain_sheet};
 use crate::scenario::Scenario;
+use crate::visible::visible;
 use crate::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -47,10 +48,7 @@ pub(super) fn show(arguments: &ShowArguments, console: &Console) -> Result<Endin
             return Err(Error::input(format!("{}: this is not the name of a file", input.display())));
         }
     };
-    if let Some(plot) = &plot {
-        ensure_writable(plot)?;
-    }
-    let read = arguments.source.read()?;
+    let read = arguments.source.read(plot.as_deref())?;
     if read.has_ends {
         read.loaded.ensure_inside(read.ground.field.extent())?;
     }
@@ -71,10 +69,10 @@ pub(super) fn show(arguments: &ShowArguments, console: &Console) -> Result<Endin
         };
         write_atomically(plot, terrain_sheet(&view).as_bytes())?;
     }
-    facts.iter().for_each(|line| console.result(line));
-    notes.iter().for_each(|note| console.result(&format!("Note: {note}.")));
+    facts.iter().for_each(|line| console.result(&visible(line)));
+    notes.iter().for_each(|note| console.result(&visible(&format!("Note: {note}."))));
     if let Some(plot) = &plot {
-        console.result(&format!("Written: {}", plot.display()));
+        console.result(&format!("Written: {}", visible(&plot.display().to_string())));
     }
     console.object(&json!({
         "input": input,

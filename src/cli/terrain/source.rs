@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::files::ensure_outputs;
 use crate::scenario::{self, LoadedScenario, TerrainSpec};
 use crate::terrain::{self, Ground, Heightmap};
 use crate::{Error, Result};
@@ -56,15 +57,15 @@ impl SourceArguments {
         &self.input
     }
 
-    /// Reads the ground.
+    /// Reads the ground, unless the output cannot be written or is an input.
     ///
     /// # Errors
     /// For files and values that are wrong; in a message about a bare file, options stand for keys.
-    pub fn read(&self) -> Result<Read> {
+    pub fn read(&self, output: Option<&Path>) -> Result<Read> {
         let is_scenario = self.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         if is_scenario {
             let overrides: Vec<String> = self.set.iter().cloned().chain(self.overrides()).collect();
-            return read(scenario::load(&self.input, &overrides)?, true);
+            return read(scenario::load(&self.input, &overrides)?, output, true);
         }
         if let Some(set) = self.set.first() {
             let what =
@@ -80,7 +81,7 @@ impl SourceArguments {
         );
         let folder = self.input.parent().unwrap_or(Path::new(""));
         let loaded = scenario::load_text(name, &text, folder, &self.overrides());
-        loaded.and_then(|loaded| read(loaded, false)).map_err(|e| self.with_options(e))
+        loaded.and_then(|loaded| read(loaded, output, false)).map_err(|e| self.with_options(e))
     }
 
     /// The options as values of a scenario.
@@ -122,7 +123,8 @@ impl SourceArguments {
     }
 }
 
-fn read(loaded: LoadedScenario, has_ends: bool) -> Result<Read> {
+fn read(loaded: LoadedScenario, output: Option<&Path>, has_ends: bool) -> Result<Read> {
+    ensure_outputs(output.as_slice(), &loaded.files())?;
     let heightmap = match &loaded.scenario.terrain {
         TerrainSpec::Heightmap(spec) => {
             Some(terrain::read_heightmap(spec, &loaded.base_dir).map_err(|e| loaded.locate(e))?)
