@@ -66,7 +66,7 @@ fn the_ground_of_a_plan_is_read_back_as_it_was() {
         "file = \"a.npy\"\nspacing = {SPACING}\nlayout = \"x-y\"\norigin = [3.0, -1.0]\nsmoothing = 0.02"
     );
     let first = ground(&keys, folder.path());
-    let Grid { rows, columns, origin, spacing } = first.field.grid().clone();
+    let Grid { rows, columns, origin, spacing } = *first.field.grid();
     let raw = first.raw.clone().unwrap();
     // As a plan holds it, also saved alone.
     let members = [

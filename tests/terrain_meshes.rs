@@ -46,14 +46,14 @@ fn meshes_are_seen_from_above() {
 }
 
 /// A box from `low` to `high`: vertices and faces that look outward.
-fn solid(low: [f64; 3], high: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
+fn solid(low: [f64; 3], high: [f64; 3]) -> Mesh {
     let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] });
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let faces = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
     ((0..8).map(corner).collect(), faces.collect())
 }
 
-fn joined(parts: &[(Vec<[f64; 3]>, Vec<[usize; 3]>)]) -> Vec<u8> {
+fn joined(parts: &[Mesh]) -> Vec<u8> {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for (v, f) in parts {
         faces.extend(f.iter().map(|face| face.map(|i| i + vertices.len())));
@@ -89,7 +89,7 @@ fn only_what_a_robot_could_stand_on_is_hidden_ground() {
     let found = ground_of("a.obj", &joined(&[sheet(0.0, 1.0), sheet(0.4, 0.3)]), keys);
     assert!(has_note(&found, "hides ground 0.400 m below"), "{:?}", found.report.notes);
     // Two sheets side by side leave the middle open.
-    let beside = |(mut vertices, faces): (Vec<[f64; 3]>, Vec<[usize; 3]>), x: f64| {
+    let beside = |(mut vertices, faces): Mesh, x: f64| {
         vertices.iter_mut().for_each(|v| v[0] += x);
         (vertices, faces)
     };

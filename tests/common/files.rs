@@ -98,8 +98,11 @@ pub fn hfield(rows: i32, columns: i32, values: &[f64]) -> Vec<u8> {
     [head, values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect()].concat()
 }
 
+/// Vertices, and faces of the vertices with these numbers, from 0.
+pub type Mesh = (Vec<[f64; 3]>, Vec<[usize; 3]>);
+
 /// Vertices and faces (from 0) of the ground as a mesh whose vertices are its cells.
-pub fn mesh() -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
+pub fn mesh() -> Mesh {
     let vertex = |k: usize| {
         let (i, j) = (k % COLUMNS, k / COLUMNS);
         [CORNER[0] + SPACING * i as f64, CORNER[1] + SPACING * j as f64, height(i, j)]

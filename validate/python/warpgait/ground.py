@@ -1,0 +1,51 @@
+"""Grounds for scenarios from arrays: the `.npz` files that `terrain.file` names."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+from .files import write_bytes
+
+LAYOUTS = ("picture", "y-up", "x-y", "grid-map")
+_MOST_CELLS = 4096 * 4096
+
+
+def write_terrain(
+    path: str | Path,
+    heights: npt.ArrayLike,
+    *,
+    spacing: float,
+    layout: str = "picture",
+    origin: tuple[float, float] = (0.0, 0.0),
+) -> None:
+    """Write a ground that a scenario can name: `kind = "heightmap"`, `file = "NAME.npz"`.
+
+    `heights` is two-dimensional, in m, NaN where there is no data. `layout` says which way its indices run, as `terrain.layout` does:
+    picture (a[0, 0] at the least x and the largest y), y-up (a[y, x]), x-y (a[x, y]) or grid-map. `origin` is x, y of the center, m.
+    Raises `InputError`.
+    """
+    array = np.asarray(heights)
+    if array.ndim != 2 or min(array.shape) < 4 or array.size > _MOST_CELLS:
+        raise InputError(
+            f"heights of shape {array.shape}: expected two dimensions of at least 4, at most {_MOST_CELLS} cells in all"
+        )
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"heights of type {array.dtype}: expected numbers, in m")
+    if np.isinf(array).any():
+        raise InputError("heights must be finite, or NaN where there is no data")
+    if layout not in LAYOUTS:
+        raise InputError(f'layout "{layout}": expected one of {", ".join(LAYOUTS)}')
+    if not 0.001 <= spacing <= 10.0:
+        raise InputError(f"spacing {spacing}: expected a number from 0.001 to 10, m")
+    columns, rows = array.shape if layout in ("x-y", "grid-map") else array.shape[::-1]
+    corner = np.asarray(origin, dtype=float) - 0.5 * spacing * (np.array([columns, rows]) - 1)
+    if corner.shape != (2,) or not np.isfinite(corner).all():
+        raise InputError(f"origin {origin}: expected x and y of the center, m")
+    content = io.BytesIO()
+    np.savez_compressed(content, heights=array.astype(float), spacing=float(spacing), origin=corner, layout=np.array(layout))
+    write_bytes(Path(path), content.getvalue())
