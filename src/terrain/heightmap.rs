@@ -7,10 +7,9 @@ use serde::Serialize;
 use super::file::read_file;
 use super::formats::{self, Input};
 use super::ground::Ground;
-use super::placing::{Placed, place};
 use super::raster::{Raster, Values};
 use super::scan::{self, Scan};
-use super::suspect;
+use super::{placing, suspect};
 use crate::digest::sha256_hex;
 use crate::error::{Error, Result};
 use crate::scenario::Footholds;
@@ -70,13 +69,14 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     let mut inputs = vec![(name.clone(), sha256_hex(&bytes))];
     inputs.append(&mut raster.inputs);
 
-    let stored = raster.values.clone();
+    let (grid, placing) = placing::grid(&raster, spec, layout, format.name)?;
+    let [x_min, x_max, y_min, y_max] = grid.extent();
+    let diagonal = (x_max - x_min).hypot(y_max - y_min);
+    let suspicion = suspect::check(&raster.values, unit, diagonal).map_err(located)?;
     for value in &mut raster.values {
         *value *= unit;
     }
-    let Placed { scan, notes } = place(raster, spec, layout, format.name)?;
-    let [x_min, x_max, y_min, y_max] = scan.grid.extent();
-    let suspicion = suspect::check(&stored, unit, (x_max - x_min).hypot(y_max - y_min)).map_err(located)?;
+    let (scan, squared) = placing::scan(&raster, layout, &grid).map_err(located)?;
     let source = Source {
         file: name.clone(),
         format: format.name,
@@ -85,7 +85,7 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
         shape,
         unit,
         unknown: scan.heights.iter().filter(|h| h.is_nan()).count(),
-        notes: notes.into_iter().chain(suspicion).collect(),
+        notes: raster.notes.into_iter().chain(placing).chain(squared).chain(suspicion).collect(),
     };
     Ok(Heightmap { scan, source, inputs })
 }

@@ -13,20 +13,17 @@ const SAME_SPACING: f64 = 1e-6;
 /// Files with coordinates beyond this, such as those of a country's grid, are moved to the origin, m.
 const FARTHEST: f64 = 1e5;
 
-/// Heights in the world.
-pub struct Placed {
-    /// Heights at the nodes of a grid.
-    pub scan: Scan,
-    /// What a user should know about their places.
-    pub notes: Vec<String>,
-}
-
-/// Puts heights (m) where the scenario, or else the file, says.
+/// The places of the cells of a raster, where the scenario, or else the file, says; and what a user should know about them.
 ///
 /// # Errors
 /// [`Error::Key`] if neither says how far apart the cells are.
-pub fn place(raster: Raster, spec: &HeightmapSpec, layout: Layout, format: &str) -> Result<Placed> {
-    let mut notes = raster.notes;
+pub fn grid(
+    raster: &Raster,
+    spec: &HeightmapSpec,
+    layout: Layout,
+    format: &str,
+) -> Result<(Grid, Vec<String>)> {
+    let mut notes = Vec::new();
     let given = spec.spacing.map(|s| [s; 2]);
     let Some(spacing) = given.or(raster.spacing) else {
         let what = format!(
@@ -71,18 +68,22 @@ pub fn place(raster: Raster, spec: &HeightmapSpec, layout: Layout, format: &str)
         columns,
         rows,
     };
+    Ok((grid, notes))
+}
+
+/// Heights at the nodes of their grid, made square where it is not; and a note if so.
+///
+/// # Errors
+/// If square cells are too many.
+pub fn scan(raster: &Raster, layout: Layout, grid: &Grid) -> Result<(Scan, Option<String>)> {
     let heights = arranged(&raster.values, raster.columns, layout);
-    let scan = if (spacing[0] - spacing[1]).abs() > SAME_SPACING * spacing[0] {
-        let scan = with_square_cells(&grid, &heights)?;
-        notes.push(format!(
-            "cells of {} x {} m were interpolated to square ones of {} m",
-            spacing[0], spacing[1], scan.grid.spacing[0]
-        ));
-        scan
-    } else {
-        Scan { grid: Grid { spacing: [spacing[0]; 2], ..grid }, heights }
-    };
-    Ok(Placed { scan, notes })
+    let [x, y] = grid.spacing;
+    if (x - y).abs() <= SAME_SPACING * x {
+        return Ok((Scan { grid: Grid { spacing: [x; 2], ..*grid }, heights }, None));
+    }
+    let scan = with_square_cells(grid, &heights)?;
+    let note = format!("cells of {x} x {y} m were interpolated to square ones of {} m", scan.grid.spacing[0]);
+    Ok((scan, Some(note)))
 }
 
 /// The values of an array a[i, j] of `columns` columns, row by row from the least y, each from the least x.

@@ -176,3 +176,38 @@ pub fn ply(vertices: &[[f64; 3]], faces: &[[usize; 3]], format: &str) -> Vec<u8>
     }
     bytes
 }
+
+/// One small valid file of each format, with the keys that it needs.
+pub fn samples() -> Vec<(&'static str, Vec<u8>)> {
+    let (shape, values) = stored("picture");
+    let (vertices, faces) = mesh();
+    let levels: Vec<u8> = (0..35).collect();
+    let float: Vec<u8> = values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+    let line = |separator: &str| {
+        let row = |row: &[f64]| row.iter().map(f64::to_string).collect::<Vec<_>>().join(separator);
+        values.chunks(COLUMNS).map(row).collect::<Vec<_>>().join("\n")
+    };
+    let xml = format!(
+        "<mujoco><asset><hfield name=\"g\" size=\"1 1 1 1\" nrow=\"5\" ncol=\"7\" elevation=\"{}\"/></asset><worldbody><geom hfield=\"g\"/></worldbody></mujoco>",
+        line(" ").replace('\n', " ")
+    );
+    vec![
+        ("a.png", png(png::ColorType::Grayscale, png::BitDepth::Eight, [7, 5], None, &levels)),
+        (
+            "b.png",
+            png(png::ColorType::Indexed, png::BitDepth::Four, [7, 5], Some(&[0, 0, 0, 9, 9, 9]), &[0x10; 20]),
+        ),
+        ("a.tif", tiff(&gray_tags(32, 3), &float)),
+        ("a.npy", floats(&shape, &values)),
+        ("a.npz", npz(&[("a", &shape, &values), ("spacing", &[], &[0.02])], Some("y-up"))),
+        ("a.csv", line(",").into_bytes()),
+        ("a.asc", format!("ncols 7\nnrows 5\ncellsize 0.02\n{}", line(" ")).into_bytes()),
+        ("a.xml", xml.into_bytes()),
+        ("a.bin", hfield(5, 7, &values)),
+        ("a.obj", obj(&vertices, &faces)),
+        ("a.stl", stl(&vertices, &faces)),
+        ("b.stl", stl_text(&vertices, &faces)),
+        ("a.ply", ply(&vertices, &faces, "ascii")),
+        ("b.ply", ply(&vertices, &faces, "binary_little_endian")),
+    ]
+}

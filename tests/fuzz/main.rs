@@ -133,7 +133,7 @@ fn heights() {
             let overrides = [
                 "terrain.kind=heightmap",
                 "terrain.file=f",
-                "terrain.spacing=0.1",
+                "terrain.spacing=0.02",
                 "terrain.height_scale=0.5",
             ];
             let loaded =

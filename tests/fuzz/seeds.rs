@@ -77,7 +77,8 @@ pub fn heights() -> Vec<Vec<u8>> {
         bytes
     };
     use png::{BitDepth, ColorType};
-    vec![
+    let samples = common::files::samples().into_iter().map(|(_, bytes)| bytes);
+    let arrays_and_images = [
         array("<f8", false, &0.25_f64.to_le_bytes()),
         array("<f4", true, &0.25_f32.to_le_bytes()),
         array(">i2", false, &[0, 1]),
@@ -89,7 +90,8 @@ pub fn heights() -> Vec<Vec<u8>> {
         image(ColorType::GrayscaleAlpha, BitDepth::Eight, false),
         image(ColorType::Indexed, BitDepth::Four, true),
         image(ColorType::Indexed, BitDepth::Eight, true),
-    ]
+    ];
+    arrays_and_images.into_iter().chain(samples).collect()
 }
 
 /// Plans, unpacked.

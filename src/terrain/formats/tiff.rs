@@ -75,9 +75,12 @@ pub fn decode(input: &Input) -> Result<Raster> {
             "a TIFF file with {channels} bands of {value_type}; it must have one band of heights"
         )));
     }
-    let pixels = Pixels { columns, channels, alpha, white };
-    let values: Vec<f64> =
-        (0..columns * rows).map(|pixel| pixels.level(pixel, &|i| samples[i])).collect::<Result<_>>()?;
+    let values = if channels == 1 {
+        samples
+    } else {
+        let pixels = Pixels { columns, channels, alpha, white };
+        (0..columns * rows).map(|pixel| pixels.level(pixel, &|i| samples[i])).collect::<Result<_>>()?
+    };
     if let Some(i) = values.iter().position(|v| v.is_infinite()) {
         let (row, column) = (i / columns, i % columns);
         return Err(Error::input(format!(

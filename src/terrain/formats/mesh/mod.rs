@@ -15,6 +15,8 @@ pub use obj::is_obj;
 pub use ply::SIGNATURE as PLY_SIGNATURE;
 pub use stl::is_stl;
 
+/// More rays than this are refused.
+const MOST_RAYS: u64 = 4_000_000;
 /// Rays times the triangles that they meet; more would take minutes.
 const MOST_HITS: f64 = 3e8;
 
@@ -64,8 +66,15 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
     // A remainder of less than a cell is left out.
     let count = |length: f64| (length / spacing + rays::SEAM).floor().min(1e12) as u64 + 1;
     let (columns, rows) = (count(x), count(y));
-    check_size(columns, rows)
-        .map_err(|e| Error::key("terrain.spacing", format!("given {spacing}: {size}: {e}")))?;
+    let refuse = |what: &dyn std::fmt::Display| {
+        Error::key("terrain.spacing", format!("given {spacing}: {size}: {what}"))
+    };
+    check_size(columns, rows).map_err(|e| refuse(&e))?;
+    if columns * rows > MOST_RAYS {
+        return Err(refuse(&format!(
+            "{columns} x {rows} rays are too many: at most {MOST_RAYS} in all; give a larger one"
+        )));
+    }
     let grid = rays::Rays {
         corner: [bounds[0][0], bounds[1][0]],
         spacing,
@@ -73,10 +82,7 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
         rows: rows as usize,
     };
     if grid.work(&triangles) > MOST_HITS {
-        let what = format!(
-            "given {spacing}: {size} has too many layers of faces for so many rays; allowed: a larger one"
-        );
-        return Err(Error::key("terrain.spacing", what));
+        return Err(refuse(&"too many faces above each other for so many rays; give a larger one"));
     }
     let seen = grid.cast(&triangles);
     let mut raster = Raster::new(
