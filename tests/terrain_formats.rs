@@ -102,6 +102,8 @@ fn text_grids_are_read_with_every_separator() {
         let text = format!("# heights\n\n{}\r\n", rows.join("\r\n"));
         assert_is_the_ground(&ground_of("a.csv", text.as_bytes(), &keys), [0.0; 2], 1e-15);
     }
+    let wide = format!("{}\n", vec!["-0.125"; 1000].join(",")).repeat(4);
+    assert_eq!(ground_of("f", wide.as_bytes(), &keys).report.height_range, [-0.125, -0.125]);
     let named = "a,b,c,d\n1,2,3,4\n1,2,,4\n1,nan,3,4\n1,2,3,4\n".to_owned();
     assert_eq!(ground_of("a.csv", named.as_bytes(), &keys).report.holes_filled, 2);
     for (text, part) in [

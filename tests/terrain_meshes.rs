@@ -40,6 +40,11 @@ fn meshes_are_seen_from_above() {
     assert!(has_note(&found, "look down"), "{:?}", found.report.notes);
     let huge = b"ply\nformat binary_little_endian 1.0\nelement vertex 3000000\nend_header\n".to_vec();
     assert_refused("a.ply", &huge, &keys, &["3000000 elements \"vertex\" do not fit"]);
+    let mut far = vertices.clone();
+    far[0] = [400.0, 300.0, 0.0];
+    let parts = ["a mesh of 398.0", "rays from above meet no face; perhaps a vertex is far away"];
+    assert_refused("a.obj", &obj(&far, &faces), "spacing = 0.5", &parts);
+    assert_refused("a.obj", &obj(&far, &faces), "spacing = 0.16", &["are too many: at most 4000000 in all"]);
     assert_refused("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", &keys, &["not a valid OBJ file"]);
     assert_refused("a.obj", b"v 0 0 0\nv 1 0 0\n", &keys, &["a mesh without faces"]);
     assert_refused("a.obj", &obj(&vertices, &faces), "spacing = 1.0", &["given 1", "too few"]);

@@ -36,14 +36,16 @@ pub fn is_grid(input: &Input) -> bool {
     let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
     let numbers =
         |line: &str| fields(line).next().is_some() && fields(line).all(|field| number(field).is_some());
-    // A line that was cut off may end in half a number, but not in another kind of word.
     numbers(first) || (numbers(second) && (input.ends_in("csv") || input.ends_in("txt")))
 }
 
-/// The start of a file as text, up to what is none; control characters are none.
+/// The start of a file as text, up to what is none; control characters are none. What may be half a word is left out.
 fn start(bytes: &[u8]) -> String {
+    let is_part = bytes.len() > LOOKED_AT;
     let bytes = &bytes[..bytes.len().min(LOOKED_AT)];
     let text = String::from_utf8_lossy(bytes);
+    let whole = text.rfind(|c: char| c.is_whitespace() || [',', ';'].contains(&c)).filter(|_| is_part);
+    let text = &text[..whole.unwrap_or(text.len())];
     let end = text.find(|c: char| (c.is_control() && !c.is_whitespace()) || c == '\u{fffd}');
     text[..end.unwrap_or(text.len())].trim_start_matches('\u{feff}').to_owned()
 }

@@ -17,6 +17,8 @@ pub use stl::is_stl;
 
 /// More rays than this are refused.
 const MOST_RAYS: u64 = 4_000_000;
+/// A mesh with a larger fraction of rays that meet no face is refused: a vertex far away makes the grid.
+const MOST_MISSED: f64 = 0.99;
 /// Rays times the triangles that they meet; more would take minutes.
 const MOST_HITS: f64 = 3e8;
 
@@ -85,6 +87,14 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
         return Err(refuse(&"too many faces above each other for so many rays; give a larger one"));
     }
     let seen = grid.cast(&triangles);
+    let missed = seen.heights.iter().filter(|h| h.is_nan()).count();
+    if missed as f64 > MOST_MISSED * seen.heights.len() as f64 {
+        let what = format!(
+            "{size}: {missed} of {} rays from above meet no face; perhaps a vertex is far away from the others",
+            seen.heights.len()
+        );
+        return Err(Error::input(what));
+    }
     let mut raster = Raster::new(
         grid.columns,
         grid.rows,
