@@ -105,7 +105,7 @@ impl Verdict {
 /// A metric of the report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metric {
-    /// "open loop", or the name of the replay.
+    /// "check", "open loop", or the name of the replay.
     #[serde(default)]
     pub layer: String,
     /// What is measured.
@@ -122,11 +122,11 @@ pub struct Metric {
     pub verdict: Verdict,
 }
 
-/// What went wrong first.
+/// What decided the verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Incident {
-    /// When, s.
-    pub time: f64,
+    /// When, s; none for what has no place in time.
+    pub time: Option<f64>,
     /// Name of the foot, where there is one.
     pub foot: Option<String>,
     /// A description.
@@ -138,9 +138,9 @@ pub struct Incident {
 pub struct Tracked {
     /// The worst of all metrics.
     pub verdict: Verdict,
-    /// The first incident; none for a plan that passes.
+    /// The first metric that decides the verdict, in words; none for a plan that passes.
     pub first_failure: Option<Incident>,
-    /// The metrics of the open loop and of every replay that counts, in the order of the report.
+    /// The laws, and the metrics of the open loop and of every replay, in the order of the report.
     pub metrics: Vec<Metric>,
     /// Wall time of the validation without the start of Python, s.
     pub seconds: f64,
@@ -151,6 +151,7 @@ pub struct Tracked {
 struct Report {
     verdict: Verdict,
     first_failure: Option<Incident>,
+    check: Layer,
     open_loop: Layer,
     replays: Vec<Layer>,
     seconds: f64,
@@ -160,8 +161,6 @@ struct Report {
 struct Layer {
     #[serde(default)]
     name: Option<String>,
-    #[serde(default)]
-    counts: Option<bool>,
     metrics: Vec<Metric>,
 }
 
@@ -173,9 +172,10 @@ impl Tracked {
     pub fn read(report: &[u8]) -> std::result::Result<Self, String> {
         let report: Report =
             serde_json::from_slice(report).map_err(|e| format!("report of the replay: {e}"))?;
-        let layers = std::iter::once(report.open_loop).chain(report.replays);
-        let metrics = layers.filter(|layer| layer.counts != Some(false)).flat_map(|layer| {
-            let name = layer.name.unwrap_or_else(|| "open loop".into());
+        let named = |layer: Layer, name: &str| Layer { name: Some(name.into()), ..layer };
+        let fixed = [named(report.check, "check"), named(report.open_loop, "open loop")];
+        let metrics = fixed.into_iter().chain(report.replays).flat_map(|layer| {
+            let name = layer.name.unwrap_or_default();
             layer.metrics.into_iter().map(move |metric| Metric { layer: name.clone(), ..metric })
         });
         Ok(Self {
@@ -207,9 +207,11 @@ mod tests {
         let text = format!(
             r#"{{"schema": 1, "verdict": "fail", "trackable": false, "seconds": 3.5,
                 "first_failure": {{"time": 2.5, "foot": null, "what": "fall"}},
-                "open_loop": {{"metrics": [{}], "incidents": []}},
-                "replays": [{{"name": "closed loop", "counts": true, "verdict": "fail", "metrics": [{}, {}]}},
-                            {{"name": "second opinion", "counts": false, "verdict": "fail", "metrics": [{}]}}]}}"#,
+                "check": {{"metrics": [{}]}},
+                "open_loop": {{"metrics": [{}]}},
+                "replays": [{{"name": "closed loop", "verdict": "fail", "metrics": [{}, {}], "incidents": []}},
+                            {{"name": "closed loop, steps of 1 ms", "verdict": "fail", "metrics": [{}]}}]}}"#,
+            metric("newton_rms", "pass"),
             metric("peak joint speed", "marginal"),
             metric("feet", "pass"),
             metric("slip", "fail"),
@@ -217,7 +219,8 @@ mod tests {
         );
         let found = Tracked::read(text.as_bytes()).unwrap();
         assert_eq!(found.verdict, Verdict::Fail);
-        assert_eq!(found.metrics.len(), 3);
+        assert_eq!(found.metrics.len(), 5);
+        assert_eq!(found.metrics[0].layer, "check");
         let first = found.first_failing().unwrap();
         assert_eq!((first.layer.as_str(), first.name.as_str()), ("closed loop", "slip"));
         assert!(Tracked::read(b"{}").unwrap_err().contains("report of the replay"));

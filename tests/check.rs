@@ -1,17 +1,26 @@
 //! The check: a good plan passes every law; a plan that breaks one law fails that one and no other.
 
-use crate::common::{FEET, GRAVITY, MASS, ask, lifting, on_slope, standing};
-use warpgait::check::{CheckLimits, LAWS, check, check_with};
+use crate::common::{GRAVITY, MASS, ask, lifting, on_slope, standing};
+use warpgait::check::{CheckLimits, check, check_with};
 use warpgait::plan::Plan;
 
 const WEIGHT: f64 = MASS * GRAVITY;
 
+/// The laws that fail. Splines are left out: whoever changes a sample differs from them, too.
 fn failed(plan: &Plan) -> Vec<String> {
     let report = check(plan).unwrap();
-    let failed: Vec<String> =
-        report.rows.iter().filter(|row| !row.passed).map(|row| row.name.clone()).collect();
-    assert_eq!(report.passed, failed.is_empty());
-    failed
+    let failed = || report.rows.iter().filter(|row| !row.passed);
+    assert_eq!(report.passed, failed().next().is_none());
+    failed().map(|row| row.name.clone()).filter(|name| !name.starts_with("spline_")).collect()
+}
+
+/// Multiplies all forces.
+fn scale_forces(plan: &mut Plan, factor: f64) {
+    let nodes = plan.splines.iter_mut().filter(|(name, ..)| name.ends_with("_force_nodes"));
+    let nodes = nodes.flat_map(|(.., values)| values);
+    for force in plan.foot_force.iter_mut().flatten().chain(nodes) {
+        *force *= factor;
+    }
 }
 
 /// Breaks a copy of a good plan and tells which laws fail.
@@ -36,9 +45,9 @@ fn good_plans_pass_everything() {
 
 #[test]
 fn laws_of_motion() {
-    // 2 % more mass than the forces bear: over the limit in the mean, not at its worst.
-    assert_eq!(broken(standing(), |p| p.meta.robot.mass *= 1.02), ["newton_rms"]);
-    assert_eq!(broken(standing(), |p| p.meta.robot.mass *= 1.05), ["newton_rms", "newton_max"]);
+    // Forces that bear 2 % less than the weight: over the limit in the mean, not at its worst.
+    assert_eq!(broken(standing(), |p| scale_forces(p, 0.98)), ["newton_rms"]);
+    assert_eq!(broken(standing(), |p| scale_forces(p, 0.95)), ["newton_rms", "newton_max"]);
     // One bad sample.
     assert_eq!(
         broken(standing(), |p| p.foot_force[4 * 100][2] += 0.04 * WEIGHT),
@@ -66,7 +75,7 @@ fn a_turning_body_needs_torque() {
         }
         failed(&plan)
     };
-    assert_eq!(spin([0.0, 0.0, 1.0]), [""; 0]);
+    assert_eq!(spin([0.0, 0.0, 1.0]), ["rest"]);
     let skew = std::f64::consts::FRAC_1_SQRT_2;
     let report_at = |rate: f64| {
         let mut plan = standing();
@@ -85,12 +94,32 @@ fn a_turning_body_needs_torque() {
 
 #[test]
 fn derivatives_must_be_derivatives() {
-    assert_eq!(broken(standing(), |p| p.base_linear_velocity.fill([0.0, 0.05, 0.0])), ["linear_consistency"]);
+    let within = |values: &mut Vec<[f64; 3]>, value| values[1..200].fill(value);
     assert_eq!(
-        broken(standing(), |p| p.base_angular_velocity.fill([0.0, 0.0, 0.05])),
-        ["angular_consistency"]
+        broken(standing(), |p| within(&mut p.base_linear_velocity, [0.0, 0.05, 0.0])),
+        ["linear_consistency", "linear_consistency_max"]
     );
-    assert_eq!(broken(standing(), |p| p.foot_velocity[4 * 100] = [0.18, 0.0, 0.0]), ["foot_consistency"]);
+    assert_eq!(
+        broken(standing(), |p| within(&mut p.base_linear_acceleration, [0.0, 0.0, 0.2])),
+        ["newton_rms", "linear_consistency", "linear_consistency_max"]
+    );
+    assert_eq!(
+        broken(standing(), |p| within(&mut p.base_angular_velocity, [0.0, 0.0, 0.05])),
+        ["angular_consistency", "angular_consistency_max"]
+    );
+    assert_eq!(
+        broken(lifting(0.08), |p| p.foot_velocity.iter_mut().flatten().for_each(|v| *v *= 1.02)),
+        ["foot_velocity"]
+    );
+    assert_eq!(
+        broken(lifting(0.08), |p| p.foot_acceleration.iter_mut().flatten().for_each(|a| *a *= 1.5)),
+        ["foot_acceleration"]
+    );
+    assert_eq!(broken(standing(), |p| p.base_linear_velocity[200][1] = 1e-5), ["rest"]);
+    assert_eq!(
+        broken(standing(), |p| p.foot_velocity[4 * 100] = [0.18, 0.0, 0.0]),
+        ["foot_velocity", "foot_acceleration", "stance_motion"]
+    );
     assert_eq!(
         broken(standing(), |p| p.base_quaternion_wxyz[100..].fill([-1.0, 0.0, 0.0, 0.0])),
         ["quaternion"]
@@ -104,7 +133,10 @@ fn feet_and_ground() {
     let drifting =
         |p: &mut Plan| (0..201).for_each(|n| p.foot_position[4 * n + 1][0] += 0.0005 * n as f64 / 200.0);
     assert_eq!(broken(standing(), drifting), ["stance_slip"]);
-    assert_eq!(broken(lifting(0.08), |p| p.foot_position[4 * 51][2] = -0.00015), ["swing_penetration"]);
+    assert_eq!(
+        broken(lifting(0.08), |p| p.foot_position[4 * 51][2] = -0.00015),
+        ["foot_velocity", "swing_penetration"]
+    );
     assert_eq!(failed(&lifting(0.05)), ["swing_apex_shortfall"]);
     let tilt = 0.0175_f64;
     assert_eq!(
@@ -116,7 +148,7 @@ fn feet_and_ground() {
         p.ground.columns = 47;
         p.ground.height = vec![0.0; 47 * p.ground.rows];
     };
-    assert_eq!(broken(standing(), narrow), ["inside"]);
+    assert_eq!(broken(standing(), narrow), ["terrain", "inside"]);
 }
 
 #[test]
@@ -145,6 +177,8 @@ fn forces() {
     assert_eq!(broken(standing(), diagonal(-0.002)), ["pull"]);
     let sucking = |p: &mut Plan| {
         p.foot_adhesive.fill(true);
+        let (name, feet) = ("name = \"anymal_towr\"", "adhesive_feet = [\"LF\", \"RF\", \"LH\", \"RH\"]");
+        p.meta.scenario = p.meta.scenario.replace(name, &format!("{name}\n{feet}"));
         diagonal(-0.1)(p);
     };
     assert_eq!(broken(standing(), sucking), [""; 0]);
@@ -152,7 +186,8 @@ fn forces() {
         sucking(p);
         ask(p, "motion", "pull_limit = 0.05");
     };
-    assert_eq!(broken(standing(), sucking_too_much), ["pull_limit"]);
+    // Beyond the limit, nothing presses the foot onto the ground any more.
+    assert_eq!(broken(standing(), sucking_too_much), ["shear", "pull_limit"]);
     assert_eq!(broken(standing(), |p| ask(p, "motion", "force_limit = 0.2")), ["force_limit"]);
     assert_eq!(broken(lifting(0.08), |p| p.foot_force[4 * 100] = [0.0, 0.0, 1e-4 * WEIGHT]), ["swing_force"]);
     let step = |p: &mut Plan| {
@@ -173,7 +208,7 @@ fn the_body() {
     );
     // A bump under the middle of the belly, where no corner is.
     let bump = |p: &mut Plan| p.ground.height[20 * 81 + 40] = 0.25;
-    assert_eq!(broken(standing(), bump), ["base_clearance_shortfall"]);
+    assert_eq!(broken(standing(), bump), ["terrain", "base_clearance_shortfall"]);
     let elsewhere = |key: &str| {
         let key = key.to_owned();
         move |p: &mut Plan| {
@@ -182,8 +217,12 @@ fn the_body() {
             p.meta.scenario = p.meta.scenario.replace(&at, &format!("[{key}]\nposition = [0.0, 0.005]"));
         }
     };
-    assert_eq!(broken(standing(), elsewhere("start")), ["start"]);
-    assert_eq!(broken(standing(), elsewhere("goal")), ["goal"]);
+    assert_eq!(broken(standing(), elsewhere("start")), ["start", "start_yaw"]);
+    assert_eq!(broken(standing(), elsewhere("goal")), ["start_yaw", "goal"]);
+    let turned = |p: &mut Plan| p.meta.scenario = p.meta.scenario.replace("[start]", "[start]\nyaw = 0.1");
+    assert_eq!(broken(standing(), turned), ["start_yaw"]);
+    let longer = |p: &mut Plan| p.meta.scenario = p.meta.scenario.replace("horizon = 1.0", "horizon = 1.2");
+    assert_eq!(broken(standing(), longer), ["horizon"]);
     let turn = |p: &mut Plan| p.meta.scenario = p.meta.scenario.replace("[goal]", "[goal]\nyaw = 0.1");
     assert_eq!(broken(standing(), turn), ["goal_yaw"]);
 }
@@ -192,27 +231,12 @@ fn the_body() {
 fn jumps() {
     // A jump of the body breaks Newton's law as well, and its velocity.
     let hop = |p: &mut Plan| p.base_position[100..].iter_mut().for_each(|x| x[2] += 0.001);
-    assert_eq!(broken(standing(), hop), ["newton_rms", "newton_max", "linear_consistency", "base_jump"]);
+    assert_eq!(
+        broken(standing(), hop),
+        ["newton_rms", "newton_max", "linear_consistency", "linear_consistency_max", "base_jump"]
+    );
     let skip = |p: &mut Plan| (100..201).for_each(|n| p.foot_position[4 * n][1] += 0.0006);
-    assert_eq!(broken(standing(), skip), ["foot_consistency", "stance_slip", "foot_jump"]);
-}
-
-#[test]
-fn every_law_of_the_table_is_reported() {
-    let mut plan = lifting(0.08);
-    ask(&mut plan, "contact", "max_slope = 1.0");
-    plan.meta.scenario = plan.meta.scenario.replace("[goal]", "[goal]\nyaw = 0.0");
-    let around = |[x, y]: [f64; 2]| {
-        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[u, v]| [x + 0.1 * u, y + 0.1 * v, 0.0])
-    };
-    plan.patches = FEET.map(|foot| vec![around(foot); 2]).to_vec();
-    let report = check(&plan).unwrap();
-    let mut reported: Vec<&str> =
-        report.rows.iter().chain(&report.figures).map(|row| row.name.as_str()).collect();
-    let mut known: Vec<&str> = LAWS.iter().map(|law| law.name).collect();
-    reported.sort();
-    known.sort();
-    assert_eq!(reported, known);
+    assert_eq!(broken(standing(), skip), ["foot_velocity", "stance_slip", "foot_jump"]);
 }
 
 #[test]
@@ -234,7 +258,7 @@ fn limits_can_be_changed() {
         CheckLimits::default().read(&path)
     };
     let mut heavy = standing();
-    heavy.meta.robot.mass *= 1.02;
+    scale_forces(&mut heavy, 0.98);
     assert!(check_with(&heavy, &read("newton_rms = 5").unwrap()).unwrap().passed);
     // A figure becomes a law when it gets a limit.
     let report = check_with(&standing(), &read("base_clearance_least = 100.0").unwrap()).unwrap();

@@ -98,12 +98,13 @@ fn splines_that_do_not_fit_together_are_refused() {
     }
     let good = plan("direct");
     type Spoil = fn(&mut Plan);
-    let cases: [(Spoil, &str); 11] = [
+    let cases: [(Spoil, &str); 12] = [
         (|plan| plan.splines.retain(|(name, ..)| name != "LF_footholds"), "spline/LF_footholds: is missing"),
         (|plan| splines(plan, "base_control_points").1 = vec![86, 3], "expected (knot intervals + 3, 6)"),
         (|plan| splines(plan, "base_control_points").2[1] += 0.1, "start and end at rest"),
         (|plan| splines(plan, "base_knots").2[7] += 0.01, "not uniform"),
         (|plan| splines(plan, "base_knots").2.fill(f64::NAN), "not uniform"),
+        (|plan| splines(plan, "force_knots").2.reverse(), "not uniform from 0 s"),
         (|plan| splines(plan, "RH_force_nodes").1[0] -= 1, "123 values for the shape [40, 3]"),
         (|plan| splines(plan, "RH_force_nodes").1 = vec![123, 1], "the phases require [41, 3]"),
         (|plan| splines(plan, "RH_force_nodes").2.fill(1.0), "where the foot moves"),
@@ -117,6 +118,7 @@ fn splines_that_do_not_fit_together_are_refused() {
         let message = bad.motion().expect_err(words).to_string();
         assert!(message.contains(words), "`{words}` is not in: {message}");
     }
-    // A plan made by hand has samples, and no motion between them.
-    assert!(common::standing().motion().unwrap_err().to_string().contains("is missing"));
+    let mut bare = common::standing();
+    bare.splines.clear();
+    assert!(bare.motion().unwrap_err().to_string().contains("is missing"));
 }

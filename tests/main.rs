@@ -5,6 +5,7 @@
 mod architecture;
 mod bench;
 mod check;
+mod claims;
 mod cli;
 mod common;
 mod derivatives;

@@ -50,7 +50,8 @@ fn tracked(verdict: Verdict) -> Tracked {
         marginal: 2.0,
         verdict,
     };
-    let first_failure = Some(Incident { time: 1.5, foot: Some("LF".into()), what: "slips, badly".into() });
+    let first_failure =
+        Some(Incident { time: Some(1.5), foot: Some("LF".into()), what: "slips, badly".into() });
     Tracked {
         verdict,
         first_failure: first_failure.filter(|_| verdict != Verdict::Pass),

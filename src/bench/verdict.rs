@@ -67,7 +67,8 @@ fn replay_verdict(track: &Tracked) -> String {
     });
     let first = track.first_failure.as_ref().map_or(String::new(), |incident| {
         let foot = incident.foot.as_ref().map_or(String::new(), |foot| format!(" {foot}"));
-        format!("; first at {:.2} s{foot}: {}", incident.time, incident.what)
+        let time = incident.time.map_or(String::new(), |time| format!(" at {time:.2} s"));
+        format!("; first{time}{foot}: {}", incident.what)
     });
     format!("replay: {}{metric}{first}", track.verdict.name())
 }

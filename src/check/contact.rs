@@ -2,7 +2,7 @@
 
 use super::laws;
 use super::patches::{PlanPatch, patch_at, stance_numbers};
-use super::subject::{Finding, Residuals, Subject, Worst};
+use super::subject::{Finding, Residuals, Subject, Worst, larger};
 use super::vector::{dot, norm, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
@@ -59,9 +59,10 @@ fn swings(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
                 n += 1;
             }
             if begin > 0 && n > begin && n < s.samples {
-                let heights = (begin..n).map(|k| (1e3 * height_over_ground(s, stances, k, e), k));
-                let (apex, at) = heights
-                    .fold((f64::NEG_INFINITY, begin), |best, one| if one.0 > best.0 { one } else { best });
+                let heights: Vec<f64> =
+                    (begin..n).map(|k| 1e3 * height_over_ground(s, stances, k, e)).collect();
+                let apex = heights.iter().copied().fold(f64::NEG_INFINITY, larger);
+                let at = begin + heights.iter().position(|h| *h == apex).unwrap_or(0);
                 shortfall.meet(clearance - apex, at, Some(e));
                 if least.is_none_or(|known| apex < known.value) {
                     least = Some(Worst { value: apex, sample: Some(at), foot: Some(e) });
@@ -78,8 +79,9 @@ fn swings(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
 fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let motion = &s.scenario.motion;
     let percent = 100.0 / s.weight;
-    let [mut friction, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
-        [Worst::default(); 6];
+    let [mut friction, mut shear, mut pull, mut push_over, mut pull_over, mut swing, mut normals] =
+        [Worst::default(); 7];
+    let coefficient = (1.0 - s.scenario.contact.friction_margin) * s.robot.friction;
     residuals.friction = vec![0.0; s.samples];
     for (n, e) in s.sample_feet() {
         let force = s.foot_force(n, e);
@@ -87,6 +89,8 @@ fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, resi
         let patch = patch_at(s, &stances[e], n, e);
         let normal = patch.as_ref().map_or_else(|| s.ground.normal(x, y), PlanPatch::normal);
         let stated = s.plan.foot_normal[n * s.feet + e];
+        // Unit length, as an angle.
+        normals.meet((norm(stated) - 1.0).abs().to_degrees(), n, Some(e));
         // In the air over edges, the raw ground has no normal to speak of, and nothing depends on it.
         if patch.is_some() || !s.has_edges() {
             // For small angles the chord between two unit vectors is more accurate than the cosine.
@@ -101,8 +105,11 @@ fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, resi
         push_over.meet(percent * along - 100.0 * motion.force_limit, n, Some(e));
         if s.plan.foot_adhesive[e] {
             pull_over.meet(-percent * along - 100.0 * motion.pull_limit, n, Some(e));
+            // The adhesion presses the foot onto the ground with as much as it may pull.
+            let pressed = along + motion.pull_limit * s.weight;
+            shear.meet(percent * (across - coefficient * pressed), n, Some(e));
         } else {
-            let excess = percent * (across - s.plan.meta.robot.friction * along);
+            let excess = percent * (across - coefficient * along);
             friction.meet(excess, n, Some(e));
             residuals.friction[n] = residuals.friction[n].max(excess);
             pull.meet(-percent * along, n, Some(e));
@@ -110,6 +117,7 @@ fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, resi
     }
     findings.push((laws::NORMAL, normals));
     findings.push((laws::FRICTION, friction));
+    findings.push((laws::SHEAR, shear));
     findings.push((laws::PULL, pull));
     findings.push((laws::FORCE_LIMIT, push_over));
     findings.push((laws::PULL_LIMIT, pull_over));
@@ -123,7 +131,7 @@ fn footholds(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
     for (n, e) in s.sample_feet().filter(|&(n, e)| s.in_contact(n, e)) {
         let [x, y, _] = s.foot_position(n, e);
         if !s.ground.covers(x, y) {
-            let beyond = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
+            let beyond = |v: f64, low: f64, high: f64| larger(larger(low - v, v - high), 0.0);
             outside.meet(1e3 * beyond(x, x_min, x_max).hypot(beyond(y, y_min, y_max)), n, Some(e));
         }
         if let Some(most) = s.scenario.contact.max_slope {

@@ -31,15 +31,42 @@ macro_rules! laws {
 }
 
 laws! {
+    SOLVED = "solved", "1", Some(0.0), None, "0 if, according to the plan, every constraint of the NLP holds; else 1";
+    CLAIMS = "claims", "1", Some(0.0), None,
+        "number of statements on robot, limits, feet and formulation that differ from what the scenario asks for";
+    MAGNITUDE = "magnitude", "1", Some(1e9), None, "the largest number in any member, the history aside";
+    HISTORY = "history", "1", Some(1e-6), None,
+        "a row of the history has the violation of the result, its times increase up to the total, and it is as it was written";
+    HORIZON = "horizon", "s", Some(1e-6), None, "difference of the duration, and of that of all phases of a foot, from horizon";
+    TERRAIN = "terrain", "mm", Some(1.0), None,
+        "difference of the ground from the scenario's terrain, where that is a function";
+    SMOOTHING = "smoothing", "mm", Some(1.0), None,
+        "how far the ground of a heightmap leaves the range of the raw heights within reach of terrain.smoothing";
+    SPLINE_BASE = "spline_base", "mm", Some(1e-3), None, "distance of the base's samples from its spline";
+    SPLINE_TURN = "spline_turn", "mrad", Some(1e-3), None, "difference of the base's orientations from its spline";
+    SPLINE_FEET = "spline_feet", "mm", Some(1e-3), None, "distance of the feet's samples from their footholds and splines";
+    SPLINE_FORCES = "spline_forces", "% m g", Some(1e-3), None, "difference of the forces' samples from their nodes";
+    PHASES = "phases", "1", Some(0.0), None, "foot_contact is as phase_durations have it";
+    MAP = "map", "mm", Some(1e-3), None, "distance of positions from those that the map makes of their warped ones";
+    MAP_FORCES = "map_forces", "% m g", Some(1e-3), None, "the same for forces";
+    MAP_TURN = "map_turn", "mrad", Some(1e-2), None, "the same for the base's orientation";
     NEWTON_RMS = "newton_rms", "% m g", Some(0.5), None, "Newton's law, m p̈ = Σf + m g, root mean square";
     NEWTON_MAX = "newton_max", "% m g", Some(3.0), None, "Newton's law, worst sample";
     EULER_RMS = "euler_rms", "% m g·0.3 m", Some(0.5), None, "Euler's law about the center of mass, root mean square";
     EULER_MAX = "euler_max", "% m g·0.3 m", Some(3.0), None, "Euler's law, worst sample";
-    LINEAR_CONSISTENCY = "linear_consistency", "% g", Some(1.0), None,
+    LINEAR_CONSISTENCY = "linear_consistency", "% g", Some(0.1), None,
         "base velocity and acceleration are the derivatives of the position, root mean square";
+    LINEAR_CONSISTENCY_MAX = "linear_consistency_max", "% g", Some(1.0), None, "the same, worst sample";
     ANGULAR_CONSISTENCY = "angular_consistency", "rad/s²", Some(0.1), None,
         "angular velocity and acceleration are the derivatives of the orientation, root mean square";
-    FOOT_CONSISTENCY = "foot_consistency", "m/s", Some(0.05), None, "foot velocity is the derivative of the position";
+    ANGULAR_CONSISTENCY_MAX = "angular_consistency_max", "rad/s²", Some(2.0), None, "the same, worst sample";
+    FOOT_VELOCITY = "foot_velocity", "m/s", Some(0.01), None, "foot velocity is the derivative of the position";
+    FOOT_ACCELERATION = "foot_acceleration", "m/s²", Some(2.0), None,
+        "foot acceleration is the derivative of the velocity; it may jump at lift-off and touch-down";
+    STANCE_MOTION = "stance_motion", "m/s", Some(1e-6), None,
+        "a standing foot has no velocity, and no acceleration over 0.1 s";
+    REST = "rest", "m/s", Some(1e-6), None,
+        "at both ends the base has no velocity, and no acceleration over 0.1 s (rotations: times 0.3 m), and all feet stand (1 otherwise)";
     QUATERNION = "quaternion", "1", Some(1e-6), None, "quaternions have unit length and keep their sign";
     STANCE_GAP = "stance_gap", "mm", Some(1.0), None, "a standing foot is on the ground";
     STANCE_SLIP = "stance_slip", "mm", Some(0.1), None, "a standing foot does not move";
@@ -49,6 +76,8 @@ laws! {
         "a swing rises to motion.swing_clearance (allowance for the sampling: 0.2 mm)";
     NORMAL = "normal", "°", Some(0.5), None, "the plan's normals are those of its terrain";
     FRICTION = "friction", "% m g", Some(0.5), None, "force beyond the friction cone, true normals, not for adhesive feet";
+    SHEAR = "shear", "% m g", Some(0.5), None,
+        "tangential force of an adhesive foot beyond friction times normal force plus motion.pull_limit";
     PULL = "pull", "% m g", Some(0.05), None, "pull of a foot that is not adhesive (allowance for rounding: 0.05 %)";
     FORCE_LIMIT = "force_limit", "% m g", Some(0.5), None, "normal force beyond motion.force_limit";
     PULL_LIMIT = "pull_limit", "% m g", Some(0.5), None, "pull of an adhesive foot beyond motion.pull_limit";
@@ -68,6 +97,7 @@ laws! {
         "a swinging foot, as a ball, stays above raw ground with edges, or is no deeper in it than next to it, where it stands \
          (allowance for rounding: 0.1 mm)";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
+    START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the goal, at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
     GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given";
     BASE_JUMP = "base_jump", "mm", Some(0.5), None, "the base position has no jumps";

@@ -1,15 +1,20 @@
 //! The check: every law recomputed in ambient space from the plan alone, on the plan's own samples.
 //!
 //! No code of the planner is used: positions, forces and heights are read from the plan, derivatives are differences, and normals
-//! come from a spline through the plan's own height grid. Every row is "value ≤ limit".
+//! come from a spline through the plan's own height grid. Robot and limits are those that the plan's scenario asks for. Every row is
+//! "value ≤ limit". `docs/plan-file.md` says which law covers which member.
 
+mod claims;
 mod contact;
+mod derivatives;
 mod dynamics;
 mod ground;
 mod laws;
 mod motion;
 mod patches;
+mod splines;
 mod subject;
+mod terrain;
 mod vector;
 
 use crate::Result;
@@ -28,6 +33,8 @@ pub struct CheckReport {
     pub figures: Vec<CheckRow>,
     /// Whether every row holds.
     pub passed: bool,
+    /// Where the plan states something else than its scenario asks for, in sentences.
+    pub remarks: Vec<String>,
     /// The main residuals over time.
     pub residuals: Residuals,
 }
@@ -45,15 +52,21 @@ pub fn check(plan: &Plan) -> Result<CheckReport> {
 pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     plan.ensure_sound()?;
     let scenario = scenario::parse("meta.scenario", &plan.meta.scenario)?;
-    let subject = Subject::new(plan, &scenario)?;
+    let subject = Subject::new(plan, &scenario, claims::asked_robot(plan, &scenario)?)?;
     let mut residuals = Residuals { t: plan.t.clone(), ..Default::default() };
-    let mut findings = Vec::new();
+    let (mut findings, mut remarks) = (Vec::new(), Vec::new());
+    claims::findings(&subject, &mut findings, &mut remarks);
+    splines::findings(&subject, &mut findings)?;
+    terrain::findings(&subject, &mut findings)?;
+    derivatives::findings(&subject, &mut findings);
     dynamics::findings(&subject, &mut findings, &mut residuals);
     contact::findings(&subject, &mut findings, &mut residuals);
     patches::findings(&subject, &mut findings);
     motion::findings(&subject, &mut findings, &mut residuals);
 
     let (mut rows, mut figures) = (Vec::new(), Vec::new());
+    // In the order of the table of laws.
+    findings.sort_by_key(|(law, _)| LAWS.iter().position(|known| known.name == law.name));
     for (law, worst) in findings {
         let limit = limits.of(law);
         let row = CheckRow {
@@ -68,5 +81,5 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
         if limit.is_some() { rows.push(row) } else { figures.push(row) }
     }
     let passed = rows.iter().all(|row| row.passed);
-    Ok(CheckReport { rows, figures, passed, residuals })
+    Ok(CheckReport { rows, figures, passed, remarks, residuals })
 }

@@ -1,13 +1,12 @@
-//! The base: reach, clearance, start and goal, and whether anything jumps.
+//! The base: reach, clearance, and whether anything jumps.
 
 use super::laws;
-use super::subject::{Finding, Residuals, Subject, Worst, rms};
+use super::subject::{Finding, Residuals, Subject, Worst, larger, rms};
 use super::vector::{add, norm, rotate, rotate_back, scale, sub};
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     reach(s, findings, residuals);
     base_clearance(s, findings, residuals);
-    ends(s, findings);
     jumps(s, findings);
     smoothness(s, findings);
 }
@@ -19,9 +18,9 @@ fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     for (n, e) in s.sample_feet() {
         let relative = sub(s.foot_position(n, e), s.plan.base_position[n]);
         let body = rotate_back(s.plan.base_quaternion_wxyz[n], relative);
-        let limits = &s.plan.meta.robot.reach[e];
+        let limits = &s.robot.reach[e];
         let beyond =
-            std::array::from_fn(|k| ((body[k] - limits.center[k]).abs() - limits.half_size[k]).max(0.0));
+            std::array::from_fn(|k| larger((body[k] - limits.center[k]).abs() - limits.half_size[k], 0.0));
         let distance = 1e3 * norm(beyond);
         worst.meet(distance, n, Some(e));
         residuals.reach[n] = residuals.reach[n].max(distance);
@@ -31,7 +30,7 @@ fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
 
 /// Distance of 5 × 3 points of the torso's underside from the ground below them.
 fn base_clearance(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
-    let torso = &s.plan.meta.robot.torso;
+    let torso = &s.robot.torso;
     let wanted = 1e3 * s.scenario.motion.base_clearance;
     let mut shortfall = Worst::default();
     let mut least = Worst { value: f64::INFINITY, ..Default::default() };
@@ -42,7 +41,7 @@ fn base_clearance(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Resi
                 let at = [f64::from(i) / 2.0 - 1.0, f64::from(j) - 1.0, -1.0];
                 let corner = std::array::from_fn(|k| torso.center[k] + at[k] * torso.half_size[k]);
                 let [x, y, z] = add(s.plan.base_position[n], rotate(s.plan.base_quaternion_wxyz[n], corner));
-                here = here.min(1e3 * (z - s.ground.height(x, y)));
+                here = -larger(-here, -1e3 * (z - s.ground.height(x, y)));
             }
         }
         residuals.clearance.push(here);
@@ -53,25 +52,6 @@ fn base_clearance(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Resi
     }
     findings.push((laws::BASE_CLEARANCE, shortfall));
     findings.push((laws::LEAST_CLEARANCE, least));
-}
-
-fn ends(s: &Subject, findings: &mut Vec<Finding>) {
-    let last = s.samples - 1;
-    let distance = |n: usize, [x, y]: [f64; 2]| {
-        let p = s.plan.base_position[n];
-        let mut worst = Worst::default();
-        worst.meet(1e3 * (p[0] - x).hypot(p[1] - y), n, None);
-        worst
-    };
-    findings.push((laws::START, distance(0, s.scenario.start.position)));
-    findings.push((laws::GOAL, distance(last, s.scenario.goal.position)));
-    if let Some(yaw) = s.scenario.goal.yaw {
-        let [x, y, _] = rotate(s.plan.base_quaternion_wxyz[last], [1.0, 0.0, 0.0]);
-        let off = y.atan2(x) - yaw;
-        let mut worst = Worst::default();
-        worst.meet(off.sin().atan2(off.cos()).abs(), last, None);
-        findings.push((laws::GOAL_YAW, worst));
-    }
 }
 
 /// By how much a position changes from sample to sample beyond its velocities, and a force beyond its changes before and after.

@@ -2,7 +2,7 @@
 //! above the raw ground.
 
 use super::laws;
-use super::subject::{Finding, Subject, Worst};
+use super::subject::{Finding, Subject, Worst, larger};
 use super::vector::{add, cross, dot, norm, scale, sub};
 
 /// Distance between the points at which the raw ground under a foot is looked at, as a fraction of the foot's radius.
@@ -31,7 +31,7 @@ impl PlanPatch<'_> {
             let d = [to[0] - from[0], to[1] - from[1]];
             let length = d[0].hypot(d[1]);
             let at = (d[0] * (x - from[0]) + d[1] * (y - from[1])) / length;
-            (-at).max(at - length).max(0.0)
+            larger(larger(-at, at - length), 0.0)
         };
         let c = self.0;
         along(c[0], c[1]).hypot(along(c[0], c[3]))
@@ -101,26 +101,25 @@ fn under_foot(radius: f64) -> impl Iterator<Item = [f64; 2]> {
 /// Largest and mean difference of the raw ground under a foot from the plane of its patch, m.
 fn differences(s: &Subject, patch: &PlanPatch, [x, y]: [f64; 2]) -> [f64; 2] {
     let (mut largest, mut sum, mut count) = (0.0_f64, 0.0, 0.0);
-    for [u, v] in under_foot(s.plan.meta.robot.foot_radius) {
+    for [u, v] in under_foot(s.robot.foot_radius) {
         let above = s.ground.height(x + u, y + v) - patch.height(x + u, y + v);
-        largest = largest.max(above.abs());
+        largest = larger(largest, above.abs());
         sum += above;
         count += 1.0;
     }
-    // The sum is not a number if any difference is not; `max` would hide it.
-    [if f64::is_nan(sum) { sum } else { largest }, sum / count]
+    [largest, sum / count]
 }
 
 /// How deep a foot, as a ball that touches its contact point, is in the raw ground, m.
 fn depth(s: &Subject, contact: [f64; 3], direction: [f64; 3]) -> f64 {
-    let radius = s.plan.meta.robot.foot_radius;
+    let radius = s.robot.foot_radius;
     let [x, y, z] = add(contact, scale(radius, direction));
     under_foot(radius)
         .map(|[u, v]| {
             let below = (radius * radius - u * u - v * v).max(0.0).sqrt();
             s.ground.height(x + u, y + v) + below - z
         })
-        .fold(f64::NEG_INFINITY, f64::max)
+        .fold(f64::NEG_INFINITY, larger)
 }
 
 /// How deep a swinging foot is in the raw ground, by sample, m. The ground under a foothold need not be a plane, so that a foot may
@@ -128,7 +127,7 @@ fn depth(s: &Subject, contact: [f64; 3], direction: [f64; 3]) -> f64 {
 fn swing_depths(s: &Subject, e: usize) -> Vec<(usize, f64)> {
     let normal = |n: usize| s.plan.foot_normal[n * s.feet + e];
     let contact = |n: usize| s.foot_position(n, e);
-    let radius = s.plan.meta.robot.foot_radius;
+    let radius = s.robot.foot_radius;
     let mut depths = Vec::new();
     let mut n = 0;
     while n < s.samples {

@@ -3,7 +3,7 @@
 use super::ground::PlanGround;
 use super::laws::CheckedLaw;
 use super::vector::norm;
-use crate::plan::Plan;
+use crate::plan::{MetaRobot, Plan};
 use crate::scenario::Scenario;
 use crate::{Error, Result};
 
@@ -26,6 +26,9 @@ pub struct Residuals {
     pub clearance: Vec<f64>,
 }
 
+/// Largest rounding error of the first time, s.
+const FIRST_TIME: f64 = 1e-9;
+
 /// A law with its worst value.
 pub(super) type Finding = (&'static CheckedLaw, Worst);
 
@@ -33,6 +36,8 @@ pub(super) type Finding = (&'static CheckedLaw, Worst);
 pub(super) struct Subject<'a> {
     pub plan: &'a Plan,
     pub scenario: &'a Scenario,
+    /// What the plan is judged by: as the scenario asks, not as the plan states.
+    pub robot: MetaRobot,
     pub ground: PlanGround,
     pub samples: usize,
     pub feet: usize,
@@ -43,23 +48,34 @@ pub(super) struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    pub fn new(plan: &'a Plan, scenario: &'a Scenario) -> Result<Self> {
-        let gravity = norm(plan.meta.robot.gravity);
-        let weight = plan.meta.robot.mass * gravity;
+    /// `robot` is that of the scenario; as long as its file is not at hand, that of the plan.
+    pub fn new(plan: &'a Plan, scenario: &'a Scenario, robot: MetaRobot) -> Result<Self> {
+        let weight = robot.mass * norm(robot.gravity);
         if !(weight.is_finite() && weight > 0.0) {
             return Err(Error::input(format!(
                 "meta.robot: mass times gravity is {weight} N, expected more than 0"
             )));
         }
-        let radius = plan.meta.robot.foot_radius;
+        let radius = robot.foot_radius;
         let is_length = radius.is_finite() && radius > 0.0;
         if !(is_length || plan.patches.is_empty()) {
             return Err(Error::input(format!(
                 "meta.robot: foot_radius is {radius} m, expected more than 0, for the patches"
             )));
         }
+        let feet = plan.foot_names.len();
+        if robot.reach.len() != feet {
+            let boxes = robot.reach.len();
+            return Err(Error::input(format!(
+                "member `foot_names`: {feet} feet; the robot {} has {boxes}",
+                robot.name
+            )));
+        }
         let samples = plan.t.len();
-        let step = (plan.t[samples - 1] - plan.t[0]) / (samples - 1) as f64;
+        if plan.t[0].abs() > FIRST_TIME {
+            return Err(Error::input(format!("member `t`: begins at {} s, expected 0", plan.t[0])));
+        }
+        let step = plan.t[samples - 1] / (samples - 1) as f64;
         let even = plan.t.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= 1e-6 * step);
         if !(step > 0.0 && even) {
             return Err(Error::input("member `t`: the samples are not evenly spaced in time".to_owned()));
@@ -67,13 +83,14 @@ impl<'a> Subject<'a> {
         Ok(Self {
             plan,
             scenario,
+            robot,
             ground: if plan.patches.is_empty() {
                 PlanGround::smooth(&plan.ground)
             } else {
                 PlanGround::with_edges(&plan.ground)
             },
             samples,
-            feet: plan.foot_names.len(),
+            feet,
             step,
             weight,
         })
@@ -128,4 +145,9 @@ impl Worst {
 /// Root mean square.
 pub(super) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// The larger of two values; what is not a number is larger than everything. (`f64::max` would leave it out.)
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }

@@ -52,12 +52,16 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
     let solved = plan.meta.solver.success;
     let state = if solved { "Solved" } else { "Marked as not solved" };
     console.result(&report::check_table(&found, console.has_color()));
+    for remark in &found.remarks {
+        console.result(&format!("claims: {remark}."));
+    }
     console.result(&format!("{state}; {}.", report::check_counts(&found.rows)));
     console.object(&json!({
         "plan": arguments.plan,
         "passed": found.passed,
         "solved": solved,
         "checks": found.rows,
+        "remarks": found.remarks,
         "figures": figures(&found),
     }));
     Ok(if found.passed && solved { Ending::Good } else { Ending::NotGood })

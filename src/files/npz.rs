@@ -209,7 +209,7 @@ impl NpzReader {
 
     /// Reads a member whose elements take as many bytes as `width` tells from the dtype, if it is the right one. What the member says
     /// about its size is judged before anything is allocated for it.
-    fn read<T>(
+    fn read<T: Clone>(
         &mut self,
         name: &str,
         wanted: &str,
@@ -227,9 +227,6 @@ impl NpzReader {
         let Some(width) = width(dtype) else {
             return Err(error(&format!("dtype {dtype}, expected {wanted}")));
         };
-        if *fortran_order && shape.len() > 1 {
-            return Err(error(&"stored in Fortran order, expected C order"));
-        }
         let (array, limit) = (format!("{} of {dtype}", npy::tuple(shape)), MAX_UNPACKED >> 20);
         let Some(bytes) = header.num_bytes(width).filter(|&bytes| bytes <= left && width <= MAX_STRING)
         else {
@@ -256,8 +253,25 @@ impl NpzReader {
             Err(e) => return Err(error(&format!("damaged or truncated: {e}"))),
         }
         self.left -= bytes;
-        Ok((shape.iter().map(|&n| n as usize).collect(), values))
+        let (fortran_order, shape) = (*fortran_order, shape.iter().map(|&n| n as usize).collect::<Vec<_>>());
+        let values = if fortran_order { in_c_order(&shape, &values) } else { values };
+        Ok((shape, values))
     }
+}
+
+/// Values whose first index runs fastest, rearranged so that the last one does.
+fn in_c_order<T: Clone>(shape: &[usize], values: &[T]) -> Vec<T> {
+    let place = |mut flat: usize| {
+        // From the last index to the first, by the strides of the given order.
+        let (mut stride, mut at) = (values.len(), 0);
+        for &n in shape.iter().rev() {
+            stride /= n;
+            at += (flat % n) * stride;
+            flat /= n;
+        }
+        at
+    };
+    (0..values.len()).map(|flat| values[place(flat)].clone()).collect()
 }
 
 fn at_member(file: &str, member: &str, what: &dyn std::fmt::Display) -> Error {

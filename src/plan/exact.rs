@@ -94,7 +94,7 @@ impl Plan {
         {
             return Err(wrong("base_knots", "not uniform with knot 3 at 0 s"));
         }
-        let (shape, _) = self.spline("force_knots")?;
+        let (shape, force_knots) = self.spline("force_knots")?;
         let &[samples] = shape else {
             return Err(wrong("force_knots", format!("shape {shape:?}, expected one row")));
         };
@@ -103,6 +103,10 @@ impl Plan {
         }
         let intervals = samples - 1;
         let time_step = duration / intervals as f64;
+        let off = |k: usize| (force_knots[k] - k as f64 * time_step).abs();
+        if !(0..samples).all(|k| off(k) <= 1e-6 * time_step) {
+            return Err(wrong("force_knots", "not uniform from 0 s to the end of base_knots"));
+        }
         let swings = self
             .phase_durations
             .iter()

@@ -9,6 +9,7 @@ pub use read::PLAN_SCHEMA;
 
 use serde::{Deserialize, Serialize};
 
+use crate::digest::sha256_hex;
 use crate::planner::Seconds;
 use crate::robot::Box3;
 use crate::scenario::Formulation;
@@ -71,6 +72,15 @@ pub struct Plan {
     pub history_seconds: Vec<f64>,
     /// The `meta` member.
     pub meta: Meta,
+}
+
+impl Plan {
+    /// SHA-256 (hexadecimal) of the history, as in `meta.solver`.
+    pub fn history_sha256(&self) -> String {
+        let columns = [&self.history_objective, &self.history_constraint_violation, &self.history_seconds];
+        let bytes: Vec<u8> = columns.into_iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        sha256_hex(bytes)
+    }
 }
 
 /// Warped-space counterparts of the samples.
@@ -145,7 +155,7 @@ pub struct Meta {
 }
 
 /// `meta.robot`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MetaRobot {
     /// Name.
     pub name: String,
@@ -194,6 +204,10 @@ pub struct MetaSolver {
     pub iterations: usize,
     /// Largest violation, units of the NLP.
     pub max_violation: f64,
+    /// SHA-256 (hexadecimal) of the elements of `history_objective`, `history_constraint_violation` and `history_seconds`, in this
+    /// order; none in plans of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub history_sha256: Option<String>,
     /// What solved the systems of equations inside Ipopt: `faer` or `mumps`; no text in plans of versions that knew only MUMPS.
     #[serde(default)]
     pub linear_solver: String,

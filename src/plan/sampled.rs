@@ -77,7 +77,7 @@ impl Plan {
     fn empty(motion: &Motion, provenance: &Provenance) -> Self {
         let model = &motion.model;
         let history = |value: fn(&IterationRecord) -> f64| motion.history.iter().map(value).collect();
-        Self {
+        let mut plan = Self {
             t: vec![],
             base_position: vec![],
             base_quaternion_wxyz: vec![],
@@ -103,7 +103,9 @@ impl Plan {
             history_constraint_violation: history(|r| r.violation),
             history_seconds: history(|r| r.seconds),
             meta: meta(motion, provenance),
-        }
+        };
+        plan.meta.solver.history_sha256 = Some(plan.history_sha256());
+        plan
     }
 }
 
@@ -162,6 +164,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
             success: motion.solved,
             iterations: motion.iterations,
             max_violation: motion.max_violation(),
+            history_sha256: None,
             linear_solver: motion.linear_solver.to_string(),
             seconds: Seconds {
                 map: provenance.map_seconds,

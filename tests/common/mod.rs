@@ -10,8 +10,9 @@ use warpgait::pipeline::Prepared;
 use warpgait::plan::sampled::Provenance;
 use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan};
 use warpgait::planner::{Host, Motion, Progress, Seconds, solve};
-use warpgait::robot::Box3;
+use warpgait::robot::{Robot, RobotSpec};
 use warpgait::scenario::{Formulation, Scenario, load_text};
+use warpgait::trajectory::spline::swing_basis;
 use warpgait::warp::{self, WarpMap};
 
 /// Never asks to stop, and builds the maps of continuations anew.
@@ -50,7 +51,12 @@ pub const FEET: [[f64; 2]; 4] = [[0.34, 0.19], [0.34, -0.19], [-0.34, 0.19], [-0
 /// Height of the base, m.
 pub const HEIGHT: f64 = 0.42;
 
+/// Time between the nodes of the splines, s.
+const STEP: f64 = 0.05;
+
 const SCENARIO: &str = r#"schema = 1
+formulation = "direct"
+horizon = 1.0
 [robot]
 name = "anymal_towr"
 [terrain]
@@ -70,7 +76,9 @@ pub fn standing() -> Plan {
     let (rows, columns) = (41, 81);
     let per_sample = |point: [f64; 3]| vec![point; n];
     let per_foot = |point: [f64; 3]| vec![point; n * 4];
-    Plan {
+    let spec = RobotSpec { name: "anymal_towr".into(), ..Default::default() };
+    let robot = Robot::load(&spec, ".".as_ref()).expect("a shipped robot");
+    let mut plan = Plan {
         t: (0..n).map(|i| i as f64 / 200.0).collect(),
         base_position: per_sample([0.0, 0.0, HEIGHT]),
         base_quaternion_wxyz: vec![[1.0, 0.0, 0.0, 0.0]; n],
@@ -88,7 +96,7 @@ pub fn standing() -> Plan {
         foot_adhesive: vec![false; 4],
         warped: None,
         phase_durations: vec![vec![1.0]; 4],
-        splines: vec![("base_position".into(), vec![2, 3], vec![0.0, 0.0, HEIGHT, 0.0, 0.0, HEIGHT])],
+        splines: Vec::new(),
         ground: GroundGrid {
             rows,
             columns,
@@ -113,15 +121,13 @@ pub fn standing() -> Plan {
             scenario: SCENARIO.into(),
             robot: MetaRobot {
                 name: "anymal_towr".into(),
-                mass: MASS,
-                inertia: [[0.946, 0.0, 0.0], [0.0, 1.945, 0.0], [0.0, 0.0, 2.018]],
+                mass: robot.mass,
+                inertia: robot.inertia,
                 friction: 0.75,
                 gravity: [0.0, 0.0, -GRAVITY],
-                reach: FEET
-                    .map(|[x, y]| Box3 { center: [x, y, -0.42], half_size: [0.15, 0.10, 0.10] })
-                    .to_vec(),
-                torso: Box3 { center: [0.0; 3], half_size: [0.32, 0.14, 0.10] },
-                foot_radius: 0.03,
+                reach: robot.feet.iter().map(|foot| foot.reach).collect(),
+                torso: robot.torso,
+                foot_radius: robot.foot_radius(),
             },
             limits: None,
             solver: MetaSolver {
@@ -129,37 +135,75 @@ pub fn standing() -> Plan {
                 success: true,
                 iterations: 3,
                 max_violation: 1e-6,
+                history_sha256: None,
                 linear_solver: "faer".into(),
                 seconds: Seconds { total: 0.3, ..Default::default() },
             },
             checks: Vec::new(),
             inputs: Default::default(),
         },
+    };
+    set_splines(&mut plan, 0.0);
+    plan
+}
+
+/// The splines of a base that does not move, feet that stand or are lifted by `lift` m at the control points of their swings, and the
+/// forces of every tenth sample.
+fn set_splines(plan: &mut Plan, lift: f64) {
+    let nodes = (plan.t.len() - 1) / 10 + 1;
+    let [x, y, z] = plan.base_position[0];
+    let points = nodes + 2;
+    let row = |count: usize, value: &dyn Fn(usize) -> f64| (0..count).map(value).collect::<Vec<f64>>();
+    let mut splines = vec![
+        ("base_control_points".to_owned(), vec![points, 6], [x, y, z, 0.0, 0.0, 0.0].repeat(points)),
+        ("base_knots".to_owned(), vec![points + 4], row(points + 4, &|i| (i as f64 - 3.0) * STEP)),
+        ("force_knots".to_owned(), vec![nodes], row(nodes, &|k| k as f64 * STEP)),
+    ];
+    for (e, name) in plan.foot_names.iter().enumerate() {
+        let [x, y, z] = plan.foot_position[e];
+        let swings = plan.phase_durations[e].len() / 2;
+        let footholds = [x, y, z].repeat(swings + 1);
+        let lifted = [x, y, z + lift].repeat(3 * swings);
+        let forces = (0..nodes).flat_map(|k| plan.foot_force[40 * k + e]).collect();
+        splines.push((format!("{name}_footholds"), vec![swings + 1, 3], footholds));
+        splines.push((format!("{name}_swing_control_points"), vec![swings, 3, 3], lifted));
+        splines.push((format!("{name}_force_nodes"), vec![nodes, 3], forces));
     }
+    // In the order in which they are read from a file.
+    splines.sort_by(|a, b| a.0.cmp(&b.0));
+    plan.splines = splines;
 }
 
 /// The standing robot that shifts its weight onto RF and LH, lifts LF by `height` m for half a second, and stands again.
 pub fn lifting(height: f64) -> Plan {
     let mut plan = standing();
     let quarter = MASS * GRAVITY / 4.0;
+    // At the middle of a swing, the three control points between the footholds have this weight.
+    let lift = height / swing_basis(0.5)[0][1..4].iter().sum::<f64>();
     for n in 0..plan.t.len() {
-        // 1 on four feet, 0 on two; smooth from 10 to 50 and back from 150 to 190.
-        let ramp = |from: usize| ((n as f64 - from as f64) / 40.0).clamp(0.0, 1.0);
-        let smooth = |s: f64| s * s * (3.0 - 2.0 * s);
-        let share = 1.0 - smooth(ramp(10)) + smooth(ramp(150));
+        // 1 on four feet, 0 on two; between the nodes of the forces, every tenth sample, linear.
+        let share = |n: usize| {
+            let ramp = |from: usize| ((n as f64 - from as f64) / 40.0).clamp(0.0, 1.0);
+            let smooth = |s: f64| s * s * (3.0 - 2.0 * s);
+            1.0 - smooth(ramp(10)) + smooth(ramp(150))
+        };
+        let (node, u) = (n / 10 * 10, (n % 10) as f64 / 10.0);
+        let share = (1.0 - u) * share(node) + u * share(node + 10);
         for (foot, force) in [share, 2.0 - share, 2.0 - share, share].into_iter().enumerate() {
             plan.foot_force[4 * n + foot] = [0.0, 0.0, quarter * force];
         }
         if n > 50 && n < 150 {
-            let rate = std::f64::consts::PI / 0.5;
-            let phase = rate * (plan.t[n] - 0.25);
+            let duration = 0.5;
+            let [value, first, second] =
+                swing_basis((plan.t[n] - 0.25) / duration).map(|b| lift * b[1..4].iter().sum::<f64>());
             plan.foot_contact[4 * n] = false;
-            plan.foot_position[4 * n][2] = height * phase.sin().powi(2);
-            plan.foot_velocity[4 * n][2] = height * rate * (2.0 * phase).sin();
-            plan.foot_acceleration[4 * n][2] = 2.0 * height * rate * rate * (2.0 * phase).cos();
+            plan.foot_position[4 * n][2] = value;
+            plan.foot_velocity[4 * n][2] = first / duration;
+            plan.foot_acceleration[4 * n][2] = second / (duration * duration);
         }
     }
     plan.phase_durations[0] = vec![0.25, 0.5, 0.25];
+    set_splines(&mut plan, lift);
     plan
 }
 
@@ -174,6 +218,11 @@ pub fn on_slope(slope: f64) -> Plan {
     for point in &mut plan.foot_position {
         point[2] = slope * point[0];
     }
+    let flat = "kind = \"flat\"";
+    let formula = format!("kind = \"formula\"\nexpression = \"{slope} * x\"");
+    assert!(plan.meta.scenario.contains(flat));
+    plan.meta.scenario = plan.meta.scenario.replace(flat, &formula);
+    set_splines(&mut plan, 0.0);
     plan
 }
 

@@ -4,6 +4,7 @@
 //! where editors find it. A test compares the two. Every array is new and in C order. The interpreter lock is released during computation.
 
 mod arrays;
+mod check;
 mod error;
 mod solve;
 mod terrain;
@@ -12,6 +13,8 @@ mod trajectory;
 /// `warpgait._native`
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::check::check_plan;
     #[pymodule_export]
     use super::solve::solve;
     #[pymodule_export]

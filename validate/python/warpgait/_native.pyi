@@ -125,6 +125,14 @@ class Trajectory:
     def save(self, path: str | PathLike[str]) -> None:
         """Write the plan file, `NAME.plan.npz`."""
 
+def check_plan(path: str | PathLike[str]) -> str:
+    """Recompute every law of a plan from its file, as `warpgait check` does.
+
+    Returns JSON: `checks` [{`name`, `value` (null where it is not a number), `unit`, `limit`, `passed`, `time`, `foot`}], `figures` (the
+    same without a limit), `remarks` (where the plan states something else than its scenario asks for, in sentences), `passed`.
+    A damaged file is refused with file, member and reason.
+    """
+
 def load(path: str | PathLike[str]) -> Trajectory:
     """Read a plan file. A damaged file, or one without splines, is refused with file, member and reason."""
 

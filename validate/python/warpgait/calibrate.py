@@ -73,9 +73,9 @@ SPOILINGS = (
 
 
 def measure(plan: Plan, spoiling: Spoiling) -> list[Metric]:
-    """The metrics that count, of a spoiled plan."""
-    settings = Settings(second_opinion=False, raw=False, disturbance=spoiling.world)
-    return validate(spoiling.change(plan), settings).counted_metrics
+    """The metrics of a spoiled plan, but for the laws of `warpgait check`, which judge files."""
+    settings = Settings(check=False, raw=False, disturbance=spoiling.world)
+    return validate(spoiling.change(plan), settings).all_metrics
 
 
 Key = tuple[str, str]  # layer, metric

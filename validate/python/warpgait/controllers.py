@@ -1,17 +1,16 @@
-"""The two controllers of the replay: a whole-body quadratic program, and joint PD with feedforward as a pessimistic second opinion.
+"""The controller of the replay: a whole-body quadratic program.
 
-Both use a robot model of their own, the planned one, with measured positions and velocities. The simulated robot may differ from it.
+It uses a robot model of its own, the planned one, with measured positions and velocities. The simulated robot may differ from it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import daqp
 import mujoco
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from .arrays import Array, Bools, Integers, runs
 from .geometry import rotation_vector, smootherstep
@@ -65,7 +64,6 @@ class Gains:
     weight_force: float = 3e-3
     weight_acceleration: float = 1e-3
     least_normal_force: float = 5.0  # N, on feet that are not adhesive or do not touch the ground yet
-    joint: tuple[float, float] = (11.5, 0.15)  # N m/rad and N m s/rad for every kg of the robot, of the joint PD
 
 
 def swing_progress(reference: Reference) -> Array:
@@ -116,16 +114,6 @@ class TouchDown:
         self.sought = np.where(seeking, further, np.where(contact, self.sought, 0.0))
 
 
-class Controller(Protocol):
-    """What the simulation asks of a controller."""
-
-    failures: int  # control steps without a solution
-
-    def torque(self, k: int, data: Any, touching: Bools) -> Array:
-        """Motor torques (E, 3) N m at control step k for the measured state in `data` (kinematics and bias up to date)."""
-        ...
-
-
 class WholeBody:
     """Joint accelerations and stance forces from one quadratic program a control step.
 
@@ -162,8 +150,9 @@ class WholeBody:
         self._touch_down = TouchDown(swing_progress(reference), float(reference.t[1]), *self.gains.seek)
 
     def torque(self, k: int, data: Any, touching: Bools) -> Array:
-        """See `Controller.torque`. Without a solution, the torques of the step before are kept.
+        """Motor torques (E, 3) N m at control step k for the measured state in `data` (kinematics and bias up to date).
 
+        Without a solution, the torques of the step before are kept.
         Unknowns: accelerations q̈ (nv,), then the forces (3,) of each foot in stance.
         """
         mujoco.mj_fullM(self.model, data, self._M)
@@ -262,34 +251,3 @@ class WholeBody:
                 lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
                 lower[first + EDGES] = -self.pull[e]
         return C, lower, upper
-
-
-class JointPD:
-    """Joint PD around the inverse kinematics of the plan, with the legs' weight and the planned forces fed forward."""
-
-    def __init__(
-        self, model: Any, index: Indices, reference: Reference, t: Array, joints: Array, gains: Gains | None = None
-    ) -> None:
-        """`joints` (N, E, 3): joint angles at times `t` (N,)."""
-        self.model, self.index, self.reference = model, index, reference
-        spline = make_interp_spline(t, np.unwrap(joints, axis=0), k=3)
-        self._q, self._v = spline(reference.t), spline(reference.t, 1)
-        self._stiffness, self._damping = np.array((gains or Gains()).joint) * model.body_mass.sum()
-        self._jacobian = np.zeros((3, model.nv))
-        self.failures = 0
-
-    def torque(self, k: int, data: Any, touching: Bools) -> Array:
-        """See `Controller.torque`."""
-        index = self.index
-        q, v = data.qpos[index.qpos], data.qvel[index.qvel]
-        forward = (data.qfrc_bias - data.qfrc_passive)[index.qvel]
-        for e in np.flatnonzero(self.reference.contact[k]):
-            point = data.site_xpos[index.site[e]] - index.radius * self.reference.normal[k, e]
-            mujoco.mj_jac(self.model, data, self._jacobian, None, point, index.body[e])
-            forward[e] -= self._jacobian[:, index.qvel[e]].T @ self.reference.force[k, e]
-        result: Array = np.clip(
-            forward + self._stiffness * (self._q[k] - q) + self._damping * (self._v[k] - v),
-            -index.torque_limit,
-            index.torque_limit,
-        )
-        return result

@@ -46,9 +46,12 @@ class Criterion:
 class Metric:
     """One line of the report."""
 
-    layer: str  # open loop, or the name of a replay
+    layer: str  # check, open loop, or the name of a replay
     criterion: Criterion
     value: float
+    time: float | None = None  # s, when it was worst, or first beyond all limits
+    foot: str | None = None  # which one, if it is about one
+    what: str = ""  # what happened, where the name of the metric does not say enough
 
     @property
     def name(self) -> str:
@@ -59,6 +62,14 @@ class Metric:
     def verdict(self) -> Verdict:
         """The criterion's verdict on the value."""
         return self.criterion.judge(self.value)
+
+    @property
+    def reason(self) -> str:
+        """What is wrong, for people, without verdict, time and foot."""
+        c = self.criterion
+        words = f"{self.layer}: {self.what}" if self.what else f"{self.layer}: {c.name}"
+        unit = f" {c.unit}" if c.unit else ""
+        return f"{words}: {self.value:.3g}{unit}, passes {c.sign} {c.passes:g}"
 
     def __str__(self) -> str:
         """Verdict, name, value and limit, for people."""
@@ -74,11 +85,16 @@ UNREACHABLE = Criterion("postures out of reach", "", 0, 0)
 BEYOND_LIMITS = Criterion("postures past a joint limit", "", 0, 0)
 IN_GROUND = Criterion("postures with other parts in the ground", "", 0, 0)
 PLAN_FORCE = Criterion("plan: unexplained force, rms", "% m g", 0.5, 5)
+PLAN_FORCE_MAX = Criterion("plan: unexplained force, max", "% m g", 3, 10)
 PLAN_TORQUE = Criterion("plan: unexplained torque, rms", f"% m g·{LEVER:g} m", 0.5, 5)
+PLAN_TORQUE_MAX = Criterion("plan: unexplained torque, max", f"% m g·{LEVER:g} m", 3, 10)
 BODY_FORCE = Criterion("full body: unexplained force, rms", "m g", 0.05, 0.20)
+BODY_FORCE_MAX = Criterion("full body: unexplained force, max", "m g", 0.10, 0.40)
 BODY_TORQUE = Criterion("full body: unexplained torque, rms", f"m g·{LEVER:g} m", 0.10, 0.20)
+BODY_TORQUE_MAX = Criterion("full body: unexplained torque, max", f"m g·{LEVER:g} m", 0.6, 1.0)
 PEAK_TORQUE = Criterion("peak joint torque", "of limit", 0.9, 1.0)
 PEAK_SPEED = Criterion("peak joint speed", "of limit", 0.9, 1.0)
+PEAK_POWER = Criterion("peak joint power", "of limit", 0.9, 1.0)
 
 # Closed loop.
 FALL = Criterion("fall", "", 0, 0)
@@ -89,8 +105,13 @@ COM_MAX = Criterion("center of mass, max", "mm", 20, 100)
 ROTATION_RMS = Criterion("rotation, rms", "°", 1, 3)
 ROTATION_MAX = Criterion("rotation, max", "°", 3, 8)
 FEET_RMS = Criterion("feet, rms", "mm", 5, 25)
+FEET_WORST = Criterion("worst step of a foot, rms", "mm", 20, 60)
 SLIP = Criterion("slip per step", "mm", 3, 10)
+SLIP_WORST = Criterion("slip in the worst stance", "mm", 10, 30)
 CONTACT_MISMATCH = Criterion("contact mismatch", "% of samples", 1.5, 4)
+CONTACT_WORST = Criterion("contact mismatch, worst step", "ms", 60, 150)
+REPLAY_SPEED = Criterion("peak joint speed, replayed", "of limit", 1.0, 1.1)
+REPLAY_POWER = Criterion("peak joint power, replayed", "of limit", 1.0, 1.1)
 SATURATION = Criterion("torque at its limit", "% of samples", 0.5, 6)
 FOOT_FORCES = Criterion("foot forces, rms", "m g", 0.08, 0.15)
 NET_FORCE = Criterion("net force, rms", "m g", 0.07, 0.15)

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from . import criteria
-from .arrays import Array, Bools, since_start
-from .criteria import LEVER, Metric, Verdict
+from .arrays import Array, Bools, runs, since_start
+from .criteria import LEVER, Criterion, Metric
 from .model import Indices, foot_of
 from .openloop import OpenLoop
 from .plan import Plan
@@ -45,45 +45,65 @@ def _first_by_foot(layer: str, t: Array, feet: tuple[str, ...], found: Iterable[
     return incidents
 
 
-def judge_open_loop(plan: Plan, result: OpenLoop, index: Indices) -> tuple[list[Metric], list[Incident]]:
-    """Metrics of the open loop, and what went wrong in it."""
-    mg = plan.weight
+@dataclass(frozen=True)
+class _Worst:
+    """The largest of values over time, and of which foot."""
+
+    value: float
+    time: float | None
+    foot: str | None
+
+    def metric(self, layer: str, criterion: Criterion, value: float | None = None, what: str = "") -> Metric:
+        """A metric at this place; `value` is a mean, where that is judged."""
+        return Metric(layer, criterion, self.value if value is None else value, self.time, self.foot, what)
+
+
+def _worst(t: Array, values: Any, feet: tuple[str, ...] = ()) -> _Worst:
+    """Of values (K,), or (K, E, …) for `feet`. NaN counts as larger than everything."""
+    if not values.size:
+        return _Worst(float("nan"), None, None)
+    at = np.unravel_index(int(np.argmax(values)), values.shape)  # argmax takes NaN for the largest
+    return _Worst(float(values[at]), float(t[at[0]]), feet[at[1]] if feet else None)
+
+
+def _count(t: Array, flags: Any, feet: tuple[str, ...] = ()) -> _Worst:
+    """How many flags (K,) or (K, E) are true, and the first of them."""
+    found = np.argwhere(flags)
+    if not len(found):
+        return _Worst(0.0, None, None)
+    return _Worst(float(len(found)), float(t[found[0][0]]), feet[found[0][1]] if feet else None)
+
+
+def judge_open_loop(plan: Plan, result: OpenLoop, index: Indices) -> list[Metric]:
+    """Metrics of the open loop, in the order of causes."""
+    mg, t, feet = plan.weight, plan.t, plan.foot_names
     torque = np.abs(result.torque) / index.torque_limit
     speed = np.abs(result.qvel[:, index.qvel]) / index.speed_limit
-    plan_force, plan_torque = result.plan_residual[:, :3], result.plan_residual[:, 3:]
-    values = (
-        (criteria.UNREACHABLE, float(result.unreachable.sum())),
-        (criteria.BEYOND_LIMITS, float(result.beyond_limits.sum())),
-        (criteria.IN_GROUND, float(len(result.in_ground))),
-        (criteria.PLAN_FORCE, 100 * _rms(plan_force) / mg),
-        (criteria.PLAN_TORQUE, 100 * _rms(plan_torque) / (mg * LEVER)),
-        (criteria.BODY_FORCE, _rms(result.body_residual[:, :3]) / mg),
-        (criteria.BODY_TORQUE, _rms(result.body_residual[:, 3:]) / (mg * LEVER)),
-        (criteria.PEAK_TORQUE, float(torque.max())),
-        (criteria.PEAK_SPEED, float(speed.max())),
-    )
-    metrics = [Metric(OPEN_LOOP, criterion, value) for criterion, value in values]
-    verdicts = {metric.criterion: metric.verdict for metric in metrics}
-
-    incidents = []
-    for criterion, vectors, scale, what in (
-        (criteria.PLAN_FORCE, plan_force, mg, "the planned forces do not explain the motion of the center of mass"),
-        (criteria.PLAN_TORQUE, plan_torque, mg * LEVER, "the planned forces do not explain the rotation"),
+    power = np.abs(result.torque * result.qvel[:, index.qvel]) / index.power_limit
+    metrics = [
+        _count(t, result.unreachable, feet).metric(OPEN_LOOP, criteria.UNREACHABLE, what="out of reach"),
+        _count(t, result.beyond_limits, feet).metric(OPEN_LOOP, criteria.BEYOND_LIMITS, what="a joint past its limit"),
+    ]
+    in_ground = result.in_ground
+    k, body = in_ground[0] if in_ground else (0, "")
+    what = f"{body} is in the ground" if in_ground else ""
+    first = float(t[k]) if in_ground else None
+    metrics.append(Metric(OPEN_LOOP, criteria.IN_GROUND, float(len(in_ground)), first, foot_of(body, feet), what))
+    for vectors, scale, mean, largest, what in (
+        (result.plan_residual[:, :3], mg / 100, criteria.PLAN_FORCE, criteria.PLAN_FORCE_MAX, "the center of mass"),
+        (result.plan_residual[:, 3:], mg * LEVER / 100, criteria.PLAN_TORQUE, criteria.PLAN_TORQUE_MAX, "the rotation"),
+        (result.body_residual[:, :3], mg, criteria.BODY_FORCE, criteria.BODY_FORCE_MAX, ""),
+        (result.body_residual[:, 3:], mg * LEVER, criteria.BODY_TORQUE, criteria.BODY_TORQUE_MAX, ""),
     ):
-        if verdicts[criterion] is not Verdict.PASS:
-            beyond = 100 * np.linalg.norm(vectors, axis=1) / scale > criterion.passes
-            incidents.append(Incident(float(plan.t[np.argmax(beyond)]), f"{OPEN_LOOP}: {what}"))
-    by_foot = (
-        (result.unreachable, "out of reach"),
-        (result.beyond_limits, "a joint past its limit"),
-        ((torque > 1).any(-1), "the planned forces need more torque than a motor has"),
-        ((speed > 1).any(-1), "a joint faster than its limit"),
-    )
-    incidents += _first_by_foot(OPEN_LOOP, plan.t, plan.foot_names, by_foot)
-    if result.in_ground:
-        k, body = result.in_ground[0]
-        incidents.append(Incident(float(plan.t[k]), f"{OPEN_LOOP}: {body} is in the ground", foot_of(body, plan.foot_names)))
-    return metrics, incidents
+        worst = _worst(t, np.linalg.norm(vectors, axis=1) / scale)
+        words = f"the planned forces do not explain the motion of {what}" if what else ""
+        words = words.replace("motion of the rotation", "rotation")
+        metrics.append(worst.metric(OPEN_LOOP, mean, _rms(vectors) / scale, words))
+        metrics.append(worst.metric(OPEN_LOOP, largest, what=words))
+    metrics.append(_worst(t, torque, feet).metric(OPEN_LOOP, criteria.PEAK_TORQUE))
+    metrics.append(_worst(t, speed, feet).metric(OPEN_LOOP, criteria.PEAK_SPEED))
+    metrics.append(_worst(t, power, feet).metric(OPEN_LOOP, criteria.PEAK_POWER))
+    return metrics
 
 
 @dataclass(frozen=True)
@@ -115,41 +135,82 @@ def filtered_forces(replay: Replay, reference: Reference) -> FilteredForces:
     )
 
 
+def _happened(layer: str, criterion: Criterion, value: float, incident: Incident | None) -> Metric:
+    """A metric whose place and words are those of an incident, if there was one."""
+    if incident is None:
+        return Metric(layer, criterion, value)
+    return Metric(layer, criterion, value, incident.time, incident.foot, incident.what)
+
+
+def _phases(planned: Bools) -> list[tuple[int, int, int]]:
+    """Every stance and swing in flags (K, E): foot, first sample, and one past the last."""
+    return [
+        (e, first, end)
+        for e in range(planned.shape[1])
+        for flags in (planned[:, e], ~planned[:, e])
+        for first, end in runs(flags)
+    ]
+
+
+def _worst_phase(t: Array, planned: Bools, values: Array, feet: tuple[str, ...]) -> _Worst:
+    """The largest root mean square of values (K, E) in one stance or swing of a foot; the time is that of the largest value in it."""
+    found = _Worst(0.0, None, None)
+    for e, first, end in _phases(planned):
+        value = float(np.sqrt((values[first:end, e] ** 2).mean()))
+        if not value <= found.value:
+            found = _Worst(value, float(t[first + int(np.argmax(values[first:end, e]))]), feet[e])
+    return found
+
+
 def judge_closed_loop(
     layer: str, plan: Plan, replay: Replay, reference: Reference, index: Indices
 ) -> tuple[list[Metric], list[Incident]]:
-    """Metrics of a simulation, and what went wrong in it."""
-    K, mg = len(replay.t), plan.weight
+    """Metrics of a simulation, in the order of severity, and what happened in it."""
+    K, mg, t, feet = len(replay.t), plan.weight, replay.t, index.feet
+    fall = replay.fall
+    fell = _happened(layer, criteria.FALL, float(fall is not None), fall)
     if K < 2:  # nothing to measure
-        return [Metric(layer, criteria.FALL, 1.0)], _incidents_of(replay)
+        return [fell], _incidents_of(replay)
     com = np.linalg.norm(replay.com - reference.com[:K], axis=1)  # m
     turn = np.degrees(np.linalg.norm(replay.rotation_error, axis=1))
+    apart = np.linalg.norm(replay.foot - reference.foot[:K], axis=2)  # (K, E) m
     planned = reference.contact[:K]
     stances = int(planned[0].sum() + (planned[1:] & ~planned[:-1]).sum())
+    slid = since_start(planned, replay.slip)
+    period, ones = float(reference.t[1]), np.ones(planned.shape)
+    mismatch = replay.contact != planned
     forces = filtered_forces(replay, reference)
     difference = forces.difference
-    saturated = np.abs(replay.torque) > SATURATED * index.torque_limit
-    values = (
-        (criteria.FALL, 0.0 if replay.fall is None else 1.0),
-        (criteria.STRAY_CONTACTS, float((replay.stray_contacts > 0).sum())),
-        (criteria.NO_SOLUTION, 100.0 * replay.controller_failures / K),
-        (criteria.COM_RMS, 1e3 * float(np.sqrt((com**2).mean()))),
-        (criteria.COM_MAX, 1e3 * float(com.max())),
-        (criteria.ROTATION_RMS, float(np.sqrt((turn**2).mean()))),
-        (criteria.ROTATION_MAX, float(turn.max())),
-        (criteria.FEET_RMS, 1e3 * _rms(replay.foot - reference.foot[:K])),
-        (criteria.SLIP, 1e3 * float(replay.slip.sum()) / max(stances, 1)),
-        (criteria.CONTACT_MISMATCH, 100 * float((replay.contact != planned).mean())),
-        (criteria.SATURATION, 100 * float(saturated.mean())),
-        (criteria.FOOT_FORCES, float(np.sqrt(np.sum(difference**2, axis=(1, 2)).mean())) / mg),
-        (criteria.NET_FORCE, _rms(np.sum(difference, axis=1)) / mg),
-        (criteria.FORCE_CORRELATION, forces.vertical_correlation),
-    )
-    metrics = [Metric(layer, criterion, value) for criterion, value in values]
-    net = np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
+    off_feet, off_net = np.linalg.norm(difference, axis=2) / mg, np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
+    torque = np.abs(replay.torque)
+    saturated = torque > SATURATED * index.torque_limit
+    velocity = np.abs(replay.qvel[:, index.qvel])
+    center, trunk, wrong = _worst(t, com), _worst(t, turn), _worst(t, period * since_start(mismatch, ones), feet)
+    slip, first_saturated = _worst(t, slid, feet), _count(t, saturated.any(-1), feet)
+    metrics = [
+        fell,
+        _happened(layer, criteria.STRAY_CONTACTS, float((replay.stray_contacts > 0).sum()), replay.first_stray),
+        Metric(layer, criteria.NO_SOLUTION, 100.0 * replay.controller_failures / K),
+        center.metric(layer, criteria.COM_RMS, 1e3 * float(np.sqrt((com**2).mean()))),
+        center.metric(layer, criteria.COM_MAX, 1e3 * center.value),
+        trunk.metric(layer, criteria.ROTATION_RMS, float(np.sqrt((turn**2).mean()))),
+        trunk.metric(layer, criteria.ROTATION_MAX),
+        _worst(t, apart, feet).metric(layer, criteria.FEET_RMS, 1e3 * float(np.sqrt((apart**2).mean()))),
+        _worst_phase(t, planned, 1e3 * apart, feet).metric(layer, criteria.FEET_WORST),
+        slip.metric(layer, criteria.SLIP, 1e3 * float(replay.slip.sum()) / max(stances, 1)),
+        slip.metric(layer, criteria.SLIP_WORST, 1e3 * slip.value),
+        wrong.metric(layer, criteria.CONTACT_MISMATCH, 100 * float(mismatch.mean())),
+        wrong.metric(layer, criteria.CONTACT_WORST, 1e3 * wrong.value),
+        first_saturated.metric(layer, criteria.SATURATION, 100 * float(saturated.mean())),
+        _worst(t, velocity / index.speed_limit, feet).metric(layer, criteria.REPLAY_SPEED),
+        _worst(t, torque * velocity / index.power_limit, feet).metric(layer, criteria.REPLAY_POWER),
+        _worst(t, off_feet, feet).metric(layer, criteria.FOOT_FORCES, float(np.sqrt((off_feet**2).sum(1).mean()))),
+        _worst(t, off_net).metric(layer, criteria.NET_FORCE, float(np.sqrt((off_net**2).mean()))),
+        _worst(t, off_feet, feet).metric(layer, criteria.FORCE_CORRELATION, forces.vertical_correlation),
+    ]
     incidents = _incidents_of(replay)
     incidents += _incidents_by_foot(layer, replay, planned, saturated.any(-1), index)
-    incidents += _incidents_of_tracking(layer, replay.t, com, turn, net)
+    incidents += _incidents_of_tracking(layer, t, com, turn, off_net)
     return metrics, incidents
 
 

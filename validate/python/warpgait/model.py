@@ -1,6 +1,7 @@
 """Full robot models: where they are found, and what the rest of the package reads from them.
 
-A model is one MJCF file, `robots/NAME.xml`. It has a free joint `root`, a body `base`, and for each foot `F` the joints `F_HAA`, `F_HFE`
+A model is one MJCF file, `robots/NAME.xml`. Its custom numeric `joint_speed_limit` is in rad/s, and `joint_power_limit`, if it has one, in W. It
+has a free joint `root`, a body `base`, and for each foot `F` the joints `F_HAA`, `F_HFE`
 and `F_KFE`, motors with the same names, a spherical geom `F`, and a site `F` at its center. Names of bodies of that leg begin with `F`. A
 keyframe `stand` holds the nominal stance.
 """
@@ -94,6 +95,7 @@ class Indices:
     radius: float  # m, of the feet
     torque_limit: Array  # (E, 3) N m
     speed_limit: float  # rad/s
+    power_limit: Array  # (E, 3) W; where the model does not say, torque times speed
 
     @property
     def joint_names(self) -> list[str]:
@@ -130,6 +132,9 @@ def indices(model: Any, feet: tuple[str, ...]) -> Indices:
         joints = [[model.joint(f"{foot}_{j}") for j in JOINTS] for foot in feet]
         motors = [[model.actuator(f"{foot}_{j}") for j in JOINTS] for foot in feet]
         geoms = [model.geom(foot).id for foot in feet]
+        torque_limit = np.array([[m.ctrlrange[1] for m in leg] for leg in motors])
+        speed_limit = float(model.numeric("joint_speed_limit").data[0])
+        powers = [model.numeric(i).data[0] for i in range(model.nnumeric) if model.numeric(i).name == "joint_power_limit"]
         return Indices(
             feet=feet,
             qpos=np.array([[j.qposadr[0] for j in leg] for leg in joints]),
@@ -140,8 +145,9 @@ def indices(model: Any, feet: tuple[str, ...]) -> Indices:
             body=[int(model.geom_bodyid[g]) for g in geoms],
             base=model.body("base").id,
             radius=float(model.geom_size[geoms[0], 0]),
-            torque_limit=np.array([[m.ctrlrange[1] for m in leg] for leg in motors]),
-            speed_limit=float(model.numeric("joint_speed_limit").data[0]),
+            torque_limit=torque_limit,
+            speed_limit=speed_limit,
+            power_limit=np.full_like(torque_limit, powers[0]) if powers else torque_limit * speed_limit,
         )
     except KeyError as error:
         raise InputError(f"the robot model lacks a part that the replay needs (feet {', '.join(feet)}): {error}") from error

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from . import criteria
-from .criteria import Criterion, Metric
+from .criteria import Criterion, Metric, Verdict
 from .files import write_text
 from .metrics import FORCE_WINDOW, filtered_forces
 from .model import JOINTS
@@ -107,7 +107,8 @@ def _head(v: Validation) -> list[str]:
         f"whole-body controller at {v.settings.rate:g} Hz; computed in {v.seconds:.1f} s.</p>",
     ]
     if v.first_failure:
-        parts.append(f"<p><strong>First failure</strong> at {escape(str(v.first_failure))}.</p>")
+        word = "Fails" if v.verdict is Verdict.FAIL else "Marginal"
+        parts.append(f"<p><strong>{word}:</strong> {escape(str(v.first_failure))}.</p>")
     return parts + [f"<p>{escape(note)}</p>" for note in v.notes]
 
 
@@ -122,10 +123,10 @@ def _film(pictures: list[tuple[float, bytes]]) -> str:
 
 def _trial(trial: Trial) -> list[str]:
     """Verdict, metrics and incidents of a trial."""
-    title, word = _title(trial.name) + ("" if trial.counts else " (does not count toward the verdict)"), trial.verdict.word
+    title, word = _title(trial.name), trial.verdict.word
     parts = [f'<h2>{title}: <span class="{word}">{word}</span></h2>{_table(trial.metrics)}']
     if trial.incidents:
-        items = "".join(f"<li>{escape(str(i))}</li>" for i in sorted(trial.incidents, key=lambda i: i.time))
+        items = "".join(f"<li>{escape(str(i))}</li>" for i in sorted(trial.incidents, key=lambda i: i.time or 0.0))
         parts.append(f"<ul>{items}</ul>")
     return parts
 
@@ -137,6 +138,10 @@ def as_html(v: Validation, pictures: list[tuple[float, bytes]], picture_note: st
         parts.append(_film(pictures))
     if picture_note:
         parts.append(f'<p class="soft">{escape(picture_note)}</p>')
+    if v.laws.metrics:
+        broken = [m for m in v.laws.metrics if m.verdict.value]
+        what = _table(broken) if broken else f"<p>All {len(v.laws.metrics)} laws of <code>warpgait check</code> hold.</p>"
+        parts.append(f"<h2>Check</h2>{what}")
     parts.append(f"<h2>Open loop: postures, torques, the plan's own laws</h2>{_table(v.metrics)}")
     for trial in v.trials:
         parts += _trial(trial)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,16 @@ from .archive import Archive
 from .arrays import Array, Bools, runs
 from .errors import InputError
 from .geometry import smootherstep
+from .settings import CELL
 from .text import is_name
 
 SCHEMA = 1
 
 # Tolerances of a reader; a writer keeps double precision.
-_UNIFORM = 1e-6  # s, between the steps of `t`
+_UNIFORM = 1e-6  # of the mean step, by which the steps of `t` may differ
 _START = 1e-9  # s, of the first time
+_SHORTEST, _LONGEST = 0.1, 600.0  # s, what a plan may last, as in a scenario
+_MOST_CELLS = 2e7  # of the ground as it is replayed: cells of 2.5 cm over 110 m by 110 m
 _UNIT = 1e-6  # of the length of a unit vector or quaternion
 
 # Shape of every member that a replay needs: N samples, E feet, R rows along y, C columns along x.
@@ -185,7 +189,7 @@ class _Checker:
         if not isinstance(meta, dict):
             raise self.fail("meta", "is not a JSON object")
         schema = meta.get("schema")
-        if not isinstance(schema, int) or schema < 1:
+        if not isinstance(schema, int) or isinstance(schema, bool) or schema < 1:
             raise self.fail("meta", f"schema must be a positive whole number (found {schema!r})")
         if schema > SCHEMA:
             raise self.fail("meta", f"has schema {schema}; this version reads schemas up to {SCHEMA}: update warpgait")
@@ -262,8 +266,10 @@ def read_plan(path: str | Path) -> Plan:
     values |= {m: check.bools(m, s) for m, s in _BOOLS.items()}
 
     t = values["t"]
-    if len(t) < 3 or abs(t[0]) > _START or np.ptp(np.diff(t)) > _UNIFORM or t[-1] <= 0:
+    if len(t) < 3 or abs(t[0]) > _START or t[-1] <= 0 or np.ptp(np.diff(t)) > _UNIFORM * t[-1] / (len(t) - 1):
         raise check.fail("t", "expected at least three uniform times that begin at 0")
+    if not _SHORTEST <= t[-1] <= _LONGEST:
+        raise check.fail("t", f"lasts {t[-1]:.3g} s; a plan lasts between {_SHORTEST:g} and {_LONGEST:g} s")
     for member in ("base_quaternion_wxyz", "foot_normal"):
         worst = np.abs(np.linalg.norm(values[member], axis=-1) - 1.0).max()
         if worst > _UNIT:
@@ -272,6 +278,11 @@ def read_plan(path: str | Path) -> Plan:
     origin, spacing = values.pop("heightfield_origin"), values.pop("heightfield_spacing")
     if min(heights.shape) < 2 or (spacing <= 0).any():
         raise check.fail("heightfield", "needs two rows, two columns and positive spacing")
+    size = spacing * (np.array(heights.shape)[::-1] - 1)
+    cells = float(np.prod(np.maximum(size / CELL, np.array(heights.shape)[::-1])))
+    if cells > _MOST_CELLS:
+        what = f"makes a ground of {size[0]:.3g} m by {size[1]:.3g} m, which is {cells:.2g} cells of the replay; it can hold {_MOST_CELLS:.0e}"
+        raise check.fail("heightfield_spacing", what)
     raw = check.floats("heightfield_raw", ("R", "C")) if "heightfield_raw" in check.arrays else None
     if "patch_corners" in check.arrays:  # planned for the raw ground
         _check_patches(check)

@@ -15,13 +15,15 @@ CONTACT_FORCE = 3.0  # N: a foot with less force on it does not count as in cont
 class Incident:
     """Something that went wrong."""
 
-    time: float  # s
+    time: float | None  # s; none if it has no place in time
     what: str
     foot: str | None = None
 
     def __str__(self) -> str:
-        """Time, foot if any, and what happened."""
-        return f"{self.time:.2f} s{f', {self.foot}' if self.foot else ''}: {self.what}"
+        """Time and foot, if any, and what happened."""
+        place = [f"{self.time:.2f} s"] if self.time is not None else []
+        place += [self.foot] if self.foot else []
+        return f"{', '.join(place)}: {self.what}" if place else self.what
 
 
 @dataclass(frozen=True)

@@ -27,20 +27,21 @@ def _metric(m: Metric) -> dict[str, Any]:
         "pass": c.passes,
         "marginal": c.marginal,
         "verdict": m.verdict.word,
+        "time": None if m.time is None else round(m.time, 4),
+        "foot": m.foot,
     }
 
 
 def _incident(i: Incident) -> dict[str, Any]:
-    return {"time": round(i.time, 4), "foot": i.foot, "what": i.what}
+    return {"time": None if i.time is None else round(i.time, 4), "foot": i.foot, "what": i.what}
 
 
 def _trial(t: Trial) -> dict[str, Any]:
     return {
         "name": t.name,
-        "counts": t.counts,
         "verdict": t.verdict.word,
         "metrics": [_metric(m) for m in t.metrics],
-        "incidents": [_incident(i) for i in sorted(t.incidents, key=lambda i: i.time)],
+        "incidents": [_incident(i) for i in sorted(t.incidents, key=lambda i: i.time or 0.0)],
     }
 
 
@@ -58,6 +59,7 @@ def as_dict(v: Validation) -> dict[str, Any]:
         "robot": {"planned": v.plan.robot.name, "replayed": v.model_path.stem},
         "settings": {
             "rate_hz": v.settings.rate,
+            "quick": v.settings.quick,
             "mujoco": mujoco.__version__,
             "friction": v.plan.robot.friction if d.friction is None else d.friction,
             "mass_factor": d.mass_factor,
@@ -67,7 +69,8 @@ def as_dict(v: Validation) -> dict[str, Any]:
             "delay": d.delay,
             "seed": d.seed,
         },
-        "open_loop": {"metrics": [_metric(m) for m in v.metrics], "incidents": [_incident(i) for i in v.incidents]},
+        "check": {"metrics": [_metric(m) for m in v.laws.metrics]},
+        "open_loop": {"metrics": [_metric(m) for m in v.metrics]},
         "replays": [_trial(t) for t in v.trials],
         "seconds": round(v.seconds, 3),
     }

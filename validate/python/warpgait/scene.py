@@ -12,9 +12,8 @@ from scipy.interpolate import RectBivariateSpline
 from .arrays import Array
 from .model import adhesion_name, load_spec
 from .plan import Heightfield
-from .settings import PHYSICS_RATE, Disturbance
+from .settings import CELL, PHYSICS_RATES, Disturbance
 
-CELL = 0.025  # m: a coarser terrain is refined to this before MuJoCo cuts it into prisms
 MARGIN = 0.5  # m: beyond the heightfield, the ground goes on by this much, level with the rim
 BASE_THICKNESS = 0.5  # m of ground below the lowest point, which MuJoCo asks for
 LEAST_RISE = 1e-3  # m between lowest and highest point, so that a level terrain is not normalized to 0/0
@@ -91,7 +90,7 @@ def build_world(
     """Compile the MuJoCo model of robot and terrain. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N."""
     disturbance = disturbance or Disturbance()
     spec = load_spec(path)
-    spec.option.timestep = 1 / PHYSICS_RATE
+    spec.option.timestep = 1 / PHYSICS_RATES[0]
     spec.option.gravity = gravity
     _add_ground(spec, refine(terrain, cell), disturbance.terrain_shift)
     _add_sky(spec)

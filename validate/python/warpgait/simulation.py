@@ -14,7 +14,7 @@ import numpy as np
 
 from .arrays import Array, Bools
 from .contacts import GroundContacts
-from .controllers import Controller
+from .controllers import WholeBody
 from .geometry import rotation_vector
 from .model import Indices, foot_of
 from .reference import Reference
@@ -96,7 +96,7 @@ class Simulation:
         own_model: Any,
         index: Indices,
         reference: Reference,
-        controller: Controller,
+        controller: WholeBody,
         qpos: Array,
         disturbance: Disturbance | None = None,
     ) -> None:

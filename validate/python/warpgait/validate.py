@@ -63,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's folder)")
     parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's robot")
     parser.add_argument("--rate", type=float, default=settings.rate, metavar="HZ", help="control rate (default %(default)g)")
-    parser.add_argument("--no-second-opinion", action="store_true", help="skip the replay with joint PD control")
+    parser.add_argument("--quick", action="store_true", help="skip the second replay, with finer time steps")
     parser.add_argument("--no-raw", action="store_true", help="skip the replay on the raw heightfield")
     parser.add_argument("--no-pictures", action="store_true", help="no pictures in the report")
     parser.add_argument("--video", action="store_true", help="write NAME.mp4 as well")
@@ -122,7 +122,7 @@ def _settings(options: argparse.Namespace) -> Settings:
         delay=options.delay,
         seed=options.seed,
     )
-    return Settings(options.model, options.rate, not options.no_second_opinion, not options.no_raw, disturbance)
+    return Settings(options.model, options.rate, quick=options.quick, raw=not options.no_raw, disturbance=disturbance)
 
 
 @contextmanager
@@ -223,13 +223,13 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
 
 
 def _summary(found: Validation) -> list[str]:
-    """The verdict, a line for each fact."""
+    """The verdict and its reason, then a line for each fact."""
     lines = [f"{found.plan.path.name}: {found.verdict.word} ({found.model_path.stem}, {found.seconds:.1f} s)"]
+    first = found.first_failure
+    if first:
+        lines.append(f"  {found.verdict.word}{' at' if first.time is not None else ':'} {first}")
     lines += [f"  note: {note}" for note in found.notes]
-    lines += [f"  {metric}" for metric in found.counted_metrics if metric.verdict.value]
-    if found.first_failure:
-        lines.append(f"  first failure at {found.first_failure}")
-    lines += [f"  {trial.name}: {trial.verdict.word}" for trial in found.trials if not trial.counts]
+    lines += [f"  {metric}" for metric in found.all_metrics if metric.verdict.value]
     return [visible(line) for line in lines]
 
 

@@ -1,4 +1,4 @@
-"""A plan in, evidence out: open loop and closed loop, both controllers, planned and raw terrain."""
+"""A plan in, evidence out: laws, open loop and closed loop, with two time steps, on planned and raw terrain."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from . import laws
 from .arrays import Array
-from .controllers import Controller, JointPD, WholeBody
+from .controllers import WholeBody
 from .criteria import Metric, Verdict
+from .errors import InputError
 from .metrics import judge_closed_loop, judge_open_loop
 from .model import Indices, check_mujoco, find_model, indices, load_spec, model_file
 from .openloop import OpenLoop, analyze
@@ -21,7 +23,7 @@ from .plan import Heightfield, Plan
 from .reference import Reference, sample
 from .replay import Incident, Replay
 from .scene import build_world
-from .settings import PHYSICS_RATE, Settings
+from .settings import PHYSICS_RATES, Settings
 from .simulation import Simulation
 
 ADHESION_FACTOR = 1.1  # strength of the simulated adhesion, as a multiple of the largest pull that the plan may use
@@ -33,7 +35,6 @@ class Trial:
     """One simulated replay and its judgment."""
 
     name: str
-    counts: bool  # toward the verdict
     terrain: Heightfield
     reference: Reference
     replay: Replay
@@ -54,22 +55,22 @@ class Validation:
     model_path: Path
     index: Indices
     settings: Settings
+    laws: laws.Laws  # none where `settings.check` is off
     analysis: OpenLoop
     metrics: list[Metric]  # of the open loop
-    incidents: list[Incident]  # of the open loop
     trials: list[Trial]
     notes: list[str]
     seconds: float
 
     @property
-    def counted_metrics(self) -> list[Metric]:
-        """The metrics that decide the verdict: those of the open loop and of the trials that count."""
-        return self.metrics + [m for t in self.trials if t.counts for m in t.metrics]
+    def all_metrics(self) -> list[Metric]:
+        """The metrics that decide the verdict: laws, open loop, and all trials."""
+        return [*self.laws.metrics, *self.metrics, *(m for t in self.trials for m in t.metrics)]
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the metrics that count."""
-        return max(m.verdict for m in self.counted_metrics)
+        """The worst of all metrics."""
+        return max(m.verdict for m in self.all_metrics)
 
     @property
     def trackable(self) -> bool:
@@ -78,16 +79,16 @@ class Validation:
 
     @property
     def shown(self) -> Trial:
-        """The trial that plots and pictures show: of those that count, the first with the worst verdict."""
-        return max((t for t in self.trials if t.counts), key=lambda t: t.verdict)
+        """The trial that plots and pictures show: the first with the worst verdict."""
+        return max(self.trials, key=lambda t: t.verdict)
 
     @property
     def first_failure(self) -> Incident | None:
-        """The earliest incident of a plan that does not pass. Of incidents at the same time, the open loop's, which needs no simulation."""
+        """The first metric that decides the verdict of a plan that does not pass: what is wrong, when and with which foot."""
         if self.verdict is Verdict.PASS:
             return None
-        found = self.incidents + [i for t in self.trials if t.counts for i in t.incidents]
-        return min(found, key=lambda i: i.time, default=None)
+        metric = next(m for m in self.all_metrics if m.verdict is self.verdict)
+        return Incident(metric.time, metric.reason, metric.foot)
 
 
 @dataclass(frozen=True)
@@ -146,39 +147,29 @@ class _Trials:
         self.reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
 
     def run(self, say: Callable[[str], None]) -> list[Trial]:
-        """The closed loop on the planned terrain and, if asked for, on the raw terrain and with joint PD."""
+        """The closed loop on the planned terrain with both time steps, and on the raw terrain if asked for."""
         plan, settings = self.plan, self.settings
-        name = "closed loop"
-        say(name)
-        trials = [self._trial(name, True, plan.terrain, self.world, self.reference, self._whole_body())]
+        trials = []
+        for rate in PHYSICS_RATES[:1] if settings.quick else PHYSICS_RATES:
+            name = "closed loop" if rate == PHYSICS_RATES[0] else f"closed loop, steps of {1e3 / rate:g} ms"
+            say(name)
+            self.world.opt.timestep = 1 / rate
+            trials.append(self._trial(name, plan.terrain, self.world))
         if settings.raw and plan.terrain_raw is not None:
             name = "closed loop, raw terrain"
             say(name)
             raw = _world_of(plan, self.robot, plan.terrain_raw, settings)
-            trials.append(self._trial(name, True, plan.terrain_raw, raw, self.reference, self._whole_body()))
-        if settings.second_opinion:
-            name = "second opinion: joint PD"
-            say(name)
-            reference = sample(plan, PHYSICS_RATE, self.robot.index.radius, self.analysis.rolling)
-            trials.append(self._trial(name, False, plan.terrain, self.world, reference, self._joint_pd(reference)))
+            trials.append(self._trial(name, plan.terrain_raw, raw))
         return trials
 
-    def _whole_body(self) -> WholeBody:
-        robot = self.robot
-        return WholeBody(robot.model, robot.index, self.reference, self.plan.robot.friction, robot.pull, robot.preload)
-
-    def _joint_pd(self, reference: Reference) -> JointPD:
-        joints = self.analysis.qpos[:, self.robot.index.qpos]
-        return JointPD(self.robot.model, self.robot.index, reference, self.plan.t, joints)
-
-    def _trial(
-        self, name: str, counts: bool, terrain: Heightfield, world: Any, reference: Reference, controller: Controller
-    ) -> Trial:
+    def _trial(self, name: str, terrain: Heightfield, world: Any) -> Trial:
+        robot, reference = self.robot, self.reference
+        controller = WholeBody(robot.model, robot.index, reference, self.plan.robot.friction, robot.pull, robot.preload)
         index, start = indices(world, self.plan.foot_names), self.analysis.qpos[0]
         disturbance = self.settings.disturbance
-        replay = Simulation(world, self.robot.model, index, reference, controller, start, disturbance).run()
+        replay = Simulation(world, robot.model, index, reference, controller, start, disturbance).run()
         metrics, incidents = judge_closed_loop(name, self.plan, replay, reference, index)
-        return Trial(name, counts, terrain, reference, replay, metrics, incidents)
+        return Trial(name, terrain, reference, replay, metrics, incidents)
 
 
 def _world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Settings) -> Any:
@@ -188,17 +179,35 @@ def _world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Setting
 
 
 def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], None] = lambda _: None) -> Validation:
-    """Judge `plan` on its full robot. `say` gets the name of each stage as it begins."""
+    """Judge `plan` on its full robot. `say` gets the name of each stage as it begins.
+
+    With `settings.check`, the laws of `warpgait check` are judged in the file `plan.path` first.
+    """
     started = time.perf_counter()
     settings = settings or Settings()
     check_mujoco()
-    robot = _robot(plan, settings.model)
-    say("open loop")
-    world = _world_of(plan, robot, plan.terrain, settings)
-    index = indices(world, plan.foot_names)
-    analysis = analyze(plan, robot.model, world, index)
-    metrics, incidents = judge_open_loop(plan, analysis, robot.index)
-    trials = _Trials(plan, robot, world, analysis, settings).run(say)
-    notes = _notes(plan, robot)
+    found = laws.Laws()
+    if settings.check:
+        say("check")
+        found = laws.check(plan.path)
+    try:
+        robot = _robot(plan, settings.model)
+        say("open loop")
+        world = _world_of(plan, robot, plan.terrain, settings)
+        index = indices(world, plan.foot_names)
+        analysis = analyze(plan, robot.model, world, index)
+        metrics = judge_open_loop(plan, analysis, robot.index)
+        trials = _Trials(plan, robot, world, analysis, settings).run(say)
+    except InputError:
+        raise
+    except Exception as error:
+        if not found.broken:
+            raise
+        # A plan that breaks laws may be anything; there is nothing to report about the replay.
+        broken = ", ".join(found.broken)
+        raise InputError(f"{plan.path}: cannot be replayed, and fails checks: {broken}; see `warpgait check`") from error
+    notes = _notes(plan, robot) + [f"{remark}." for remark in found.remarks]
+    if settings.quick:
+        notes.append("Quick: the replay with steps of 1 ms was left out.")
     seconds = time.perf_counter() - started
-    return Validation(plan, robot.path, index, settings, analysis, metrics, incidents, trials, notes, seconds)
+    return Validation(plan, robot.path, index, settings, found, analysis, metrics, trials, notes, seconds)

@@ -1,0 +1,37 @@
+"""The laws of `warpgait check`, which come before any replay: what breaks one of them fails."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from ._native import check_plan
+from .criteria import Criterion, Metric
+
+CHECK = "check"
+
+
+@dataclass(frozen=True)
+class Laws:
+    """What the check found."""
+
+    metrics: tuple[Metric, ...] = ()  # one for each law
+    remarks: tuple[str, ...] = ()  # where the plan states something else than its scenario asks for
+
+    @property
+    def broken(self) -> list[str]:
+        """Names of the laws that do not hold."""
+        return [m.name for m in self.metrics if m.verdict.value]
+
+
+def check(path: Path) -> Laws:
+    """Check the plan in a file; raises `InputError` for one that cannot be read."""
+    found = json.loads(check_plan(path))
+    metrics = []
+    for row in found["checks"]:
+        value = math.nan if row["value"] is None else float(row["value"])
+        criterion = Criterion(row["name"], row["unit"], row["limit"], row["limit"])
+        metrics.append(Metric(CHECK, criterion, value, row.get("time"), row.get("foot")))
+    return Laws(tuple(metrics), tuple(found["remarks"]))
