@@ -100,7 +100,7 @@ fn same(a: &[f64], b: &[f64]) -> bool {
 fn compare(remarks: &mut Vec<String>, key: &str, stated: &[f64], asked: &[f64]) {
     if !same(stated, asked) {
         let words = |values: &[f64]| match values {
-            [value] => format!("{value}"),
+            [value] => format!("{value:?}"),
             _ => format!("{values:?}"),
         };
         remarks.push(format!(
@@ -154,7 +154,10 @@ fn limits(s: &Subject, remarks: &mut Vec<String>) {
 /// Feet, formulation, and the verdicts of earlier checks.
 fn parts(s: &Subject, remarks: &mut Vec<String>) {
     let (plan, scenario) = (s.plan, s.scenario);
-    compare(remarks, "meta.sample_rate_hz", &[plan.meta.sample_rate_hz], &[1.0 / s.step]);
+    let (stated, rate) = (plan.meta.sample_rate_hz, 1.0 / s.step);
+    if !same(&[stated], &[rate]) {
+        remarks.push(format!("meta.sample_rate_hz is {stated:?}, that of `t` {rate:?}"));
+    }
     if let Ok(robot) = Robot::load(&scenario.robot, Path::new("."))
         && scenario.robot.file.is_none()
         && robot.foot_names() != plan.foot_names

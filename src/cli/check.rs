@@ -11,7 +11,7 @@ use super::figures::figures;
 use crate::check::{CheckLimits, check_with};
 use crate::files::{ensure_outputs, write_atomically};
 use crate::plan::Plan;
-use crate::{Result, report};
+use crate::{Error, Result, report};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -45,7 +45,11 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
         limits = limits.read(file)?;
     }
     let plan = Plan::read(&arguments.plan)?;
-    let found = check_with(&plan, &limits)?;
+    let file = arguments.plan.display();
+    let found = check_with(&plan, &limits).map_err(|error| match error {
+        Error::Input(what) => Error::Input(format!("{file}: {what}")),
+        other => other,
+    })?;
     if let Some(plot) = &arguments.plot {
         write_atomically(plot, report::residuals(&plan, &found).as_bytes())?;
     }

@@ -205,13 +205,13 @@ fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Re
         let k = snapped(time / time_step);
         if !(k > edges[edges.len() - 1] && k <= intervals as f64) {
             return refuse(format!(
-                "a switch at {time} s is not after the one before it and within the plan"
+                "a switch at {time:?} s is not after the one before it and within the plan"
             ));
         }
         edges.push(k);
     }
     if edges[durations.len()] != intervals as f64 {
-        return refuse(format!("they end at {time} s, the base at {} s", intervals as f64 * time_step));
+        return refuse(format!("they end at {time:?} s, the base at {} s", intervals as f64 * time_step));
     }
     Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
 }

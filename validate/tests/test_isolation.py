@@ -17,7 +17,7 @@ from warpgait.model import find_model, model_file, robots_directories
 from warpgait.plan import read_plan
 from warpgait.validate import main
 
-QUICK = ["--no-pictures", "--no-second-opinion"]
+QUICK = ["--no-pictures", "--quick"]
 
 
 def _with_meta(source: Path, target: Path, **robot: Any) -> Path:
@@ -34,17 +34,17 @@ def _run(words: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False, **options)
 
 
-def test_a_plan_never_names_a_path_of_a_model(standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plan_never_names_a_path_of_a_model(walk_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = tmp_path / "own.xml"
-    model.write_bytes(find_model("anymal_b").read_bytes())
+    model.write_bytes(find_model("anymal_c").read_bytes())
     for name in (str(model), "../own", "own.xml/../own", "./own", ".."):
-        plan = _with_meta(standing_plan, tmp_path / "path.plan.npz", name=name)
+        plan = _with_meta(walk_plan, tmp_path / "path.plan.npz", name=name)
         with pytest.raises(InputError, match="not a path"):
             read_plan(plan)
         with pytest.raises(InputError, match="only --model"):
             find_model(name)
     assert model_file(str(model)) == model
-    assert main([str(standing_plan), "-o", str(tmp_path), "--model", str(model), *QUICK]) == 0
+    assert main([str(walk_plan), "-o", str(tmp_path), "--model", str(model), *QUICK]) == 0
     assert "own" in capsys.readouterr().out
 
 
@@ -62,21 +62,21 @@ def test_models_and_programs_of_the_working_folder_are_not_used(tmp_path: Path, 
     assert found is None or os.path.isabs(found)
 
 
-def test_modules_of_the_working_folder_are_not_imported(standing_plan: Path, tmp_path: Path) -> None:
+def test_modules_of_the_working_folder_are_not_imported(walk_plan: Path, tmp_path: Path) -> None:
     (tmp_path / "warpgait").mkdir()
     for module in ("numpy.py", "mujoco.py", "json.py", "warpgait/__init__.py", "warpgait/render.py"):
         (tmp_path / module).write_text("open('ran', 'a').write(__file__ + '\\n')\n")
     # With pictures: their process is one of its own.
-    done = _run([str(standing_plan), "-o", "out", "--no-second-opinion"], cwd=tmp_path, stdout=subprocess.PIPE)
+    done = _run([str(walk_plan), "-o", "out", "--quick"], cwd=tmp_path, stdout=subprocess.PIPE)
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "ran").exists()
 
 
 def test_without_a_verdict_no_old_one_stays(
-    standing_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    walk_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan = tmp_path / "walk.plan.npz"
-    plan.write_bytes(standing_plan.read_bytes())
+    plan.write_bytes(walk_plan.read_bytes())
     reports = [tmp_path / "walk.report.json", tmp_path / "walk.report.html"]
 
     def judged(exit_code: int, verdict: str) -> None:
@@ -86,11 +86,11 @@ def test_without_a_verdict_no_old_one_stays(
         assert (exit_code == 0) == (verdict == "pass")
 
     def good() -> None:
-        plan.write_bytes(standing_plan.read_bytes())
+        plan.write_bytes(walk_plan.read_bytes())
         judged(main([str(plan), *QUICK]), "pass")
 
     good()
-    plan.write_bytes(standing_plan.read_bytes()[:5000])  # a bad plan
+    plan.write_bytes(walk_plan.read_bytes()[:5000])  # a bad plan
     judged(main([str(plan), *QUICK]), "error")
     good()
     plan.unlink()  # a missing plan
@@ -115,20 +115,20 @@ def test_without_a_verdict_no_old_one_stays(
     capsys.readouterr()
 
 
-def test_a_report_never_replaces_the_plan(standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_never_replaces_the_plan(walk_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan = tmp_path / "walk.plan.npz"
-    plan.write_bytes(standing_plan.read_bytes())
+    plan.write_bytes(walk_plan.read_bytes())
     (tmp_path / "walk.replay.npz").symlink_to("walk.plan.npz")
     assert main([str(plan), *QUICK]) == 2
     assert "which this command reads" in capsys.readouterr().err
-    assert plan.read_bytes() == standing_plan.read_bytes()
+    assert plan.read_bytes() == walk_plan.read_bytes()
 
 
 def test_names_act_neither_on_the_terminal_nor_in_the_page(
-    standing_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    walk_plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name = "<b>\x1b[2J\n.plan.npz"
-    (tmp_path / name).write_bytes(standing_plan.read_bytes())
+    (tmp_path / name).write_bytes(walk_plan.read_bytes())
     assert main([str(tmp_path / name), *QUICK]) == 0
     said = capsys.readouterr()
     assert "\x1b" not in said.out + said.err and "\\x1b[2J\\n" in said.out
@@ -136,8 +136,8 @@ def test_names_act_neither_on_the_terminal_nor_in_the_page(
     assert "\x1b" not in page and "<b>" not in page and "&lt;b&gt;\\x1b[2J\\n" in page
 
 
-def test_a_full_standard_output_is_an_error_and_a_closed_one_is_not(standing_plan: Path, tmp_path: Path) -> None:
-    words = [str(standing_plan), "-o", str(tmp_path), *QUICK]
+def test_a_full_standard_output_is_an_error_and_a_closed_one_is_not(walk_plan: Path, tmp_path: Path) -> None:
+    words = [str(walk_plan), "-o", str(tmp_path), *QUICK]
     for more in (words, [*words, "--json"], ["none.plan.npz", "--json"]):
         with open("/dev/full", "w") as full:
             done = _run(more, stdout=full)

@@ -9,8 +9,9 @@ import pytest
 
 import crawl
 from crawl import GRAVITY
+from warpgait.collision import SelfCollision
 from warpgait.criteria import Verdict
-from warpgait.model import find_model
+from warpgait.model import find_model, foot_names, indices, load_spec, stand
 from warpgait.openloop import centroidal_residual
 from warpgait.plan import Heightfield, read_plan
 from warpgait.scene import build_world
@@ -140,3 +141,16 @@ def test_a_foot_steps_over_an_edge_that_the_plan_does_not_know(tmp_path: Path) -
     assert not trial.incidents
     behind = trial.replay.foot[-1, e] - trial.reference.foot[-1, e]
     assert np.linalg.norm(behind) < 0.02
+
+
+def test_crossed_legs_are_a_collision_and_a_stance_is_none() -> None:
+    spec = load_spec(find_model("anymal_c"))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    stand(model, data)
+    index = indices(model, foot_names(model))
+    qpos = np.stack([data.qpos.copy(), data.qpos.copy()])
+    qpos[1, index.qpos[0, 0]], qpos[1, index.qpos[1, 0]] = -0.6, 0.6  # the front legs swing inward
+    found = SelfCollision(spec, index).find(np.array([0.0, 0.02]), qpos)
+    assert [incident.time for incident in found] == [0.02]
+    assert "hits" in found[0].what and found[0].foot in ("LF", "RF")

@@ -18,6 +18,9 @@ from .model import Indices
 from .reference import Reference
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
+FRICTION_USED = (
+    0.9  # fraction of the friction that the controller uses; a foot at the edge of the cone slides, and chatters on curved ground
+)
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
 EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touch-down
 EARLY = 0.6  # fraction of a swing after which a contact is the touch-down: the foot stands
@@ -133,7 +136,7 @@ class WholeBody:
     ) -> None:
         """`pull` (E,): how hard a foot may pull, N; `preload` (E,): adhesion that adds to the normal force in the friction law, N."""
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
-        self.friction, self.pull, self.preload = friction, pull, preload
+        self.friction, self.pull, self.preload = FRICTION_USED * friction, pull, preload
         self.mass = float(model.body_mass.sum())
         self.failures = 0
         nv, E = model.nv, len(index.feet)
@@ -143,7 +146,7 @@ class WholeBody:
         self._A[3:6, 3:6] = np.eye(3)
         self._contact_jacobian = np.zeros((E, 3, nv))
         self._jacobian_rate = np.zeros((3, nv))
-        self._cones = friction_cones(reference.normal, friction)
+        self._cones = friction_cones(reference.normal, self.friction)
         self._cones_in_the_air = friction_cones(reference.normal, FRICTION_IN_THE_AIR)
         self._last = np.zeros((E, 3))
         self._step_over = StepOver(reference, *self.gains.step_over)

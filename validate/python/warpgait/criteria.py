@@ -84,6 +84,7 @@ LEVER = 0.3
 UNREACHABLE = Criterion("postures out of reach", "", 0, 0)
 BEYOND_LIMITS = Criterion("postures past a joint limit", "", 0, 0)
 IN_GROUND = Criterion("postures with other parts in the ground", "", 0, 0)
+COLLISIONS = Criterion("legs that hit each other or the trunk", "postures", 0, 0)
 PLAN_FORCE = Criterion("plan: unexplained force, rms", "% m g", 0.5, 5)
 PLAN_FORCE_MAX = Criterion("plan: unexplained force, max", "% m g", 3, 10)
 PLAN_TORQUE = Criterion("plan: unexplained torque, rms", f"% m g·{LEVER:g} m", 0.5, 5)

@@ -74,6 +74,11 @@ def _count(t: Array, flags: Any, feet: tuple[str, ...] = ()) -> _Worst:
     return _Worst(float(len(found)), float(t[found[0][0]]), feet[found[0][1]] if feet else None)
 
 
+def judge_collisions(layer: str, found: list[Incident]) -> Metric:
+    """Whether the robot hits itself."""
+    return _happened(layer, criteria.COLLISIONS, float(len(found)), found[0] if found else None)
+
+
 def judge_open_loop(plan: Plan, result: OpenLoop, index: Indices) -> list[Metric]:
     """Metrics of the open loop, in the order of causes."""
     mg, t, feet = plan.weight, plan.t, plan.foot_names

@@ -13,10 +13,11 @@ import numpy as np
 
 from . import laws
 from .arrays import Array
+from .collision import SelfCollision
 from .controllers import WholeBody
 from .criteria import Metric, Verdict
 from .errors import InputError
-from .metrics import judge_closed_loop, judge_open_loop
+from .metrics import OPEN_LOOP, judge_closed_loop, judge_collisions, judge_open_loop
 from .model import Indices, check_mujoco, find_model, indices, load_spec, model_file
 from .openloop import OpenLoop, analyze
 from .plan import Heightfield, Plan
@@ -144,6 +145,7 @@ class _Trials:
     def __init__(self, plan: Plan, robot: _Robot, world: Any, analysis: OpenLoop, settings: Settings) -> None:
         """`world` has the planned terrain."""
         self.plan, self.robot, self.world, self.analysis, self.settings = plan, robot, world, analysis, settings
+        self.collision = SelfCollision(load_spec(robot.path), robot.index)
         self.reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
 
     def run(self, say: Callable[[str], None]) -> list[Trial]:
@@ -169,6 +171,8 @@ class _Trials:
         disturbance = self.settings.disturbance
         replay = Simulation(world, robot.model, index, reference, controller, start, disturbance).run()
         metrics, incidents = judge_closed_loop(name, self.plan, replay, reference, index)
+        if len(replay.t) > 1:
+            metrics.append(judge_collisions(name, self.collision.find(replay.t, replay.qpos)))
         return Trial(name, terrain, reference, replay, metrics, incidents)
 
 
@@ -197,7 +201,9 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
         index = indices(world, plan.foot_names)
         analysis = analyze(plan, robot.model, world, index)
         metrics = judge_open_loop(plan, analysis, robot.index)
-        trials = _Trials(plan, robot, world, analysis, settings).run(say)
+        simulations = _Trials(plan, robot, world, analysis, settings)
+        metrics.append(judge_collisions(OPEN_LOOP, simulations.collision.find(plan.t, analysis.qpos)))
+        trials = simulations.run(say)
     except InputError:
         raise
     except Exception as error:
