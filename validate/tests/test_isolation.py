@@ -144,7 +144,7 @@ def test_a_full_standard_output_is_an_error_and_a_closed_one_is_not(walk_plan: P
         assert done.returncode == 2, done.stderr
         assert "error: standard output: No space left on device" in done.stderr and "Traceback" not in done.stderr
     # The verdict is written all the same, and stays.
-    assert json.loads((tmp_path / "stand.report.json").read_text())["verdict"] == "pass"
+    assert json.loads((tmp_path / "walk.report.json").read_text())["verdict"] == "pass"
     shell = f"'{sys.executable}' -P -m warpgait.validate \"$@\" >&-"
     done = subprocess.run(["sh", "-c", shell, "sh", *words], stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 0, done.stderr
