@@ -277,16 +277,19 @@ impl<'a> Solve<'a> {
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
         let solution = ipopt::solve(&mut problem, &options, &mut |record, x| {
             let iteration = record.iteration + before;
-            // A later stage starts at the point where the one before it ended, which already has its row, unless more is asked of it.
-            let known = history.last().is_some_and(|last: &IterationRecord| {
-                (last.violation, last.objective) == (record.violation, record.objective)
-            });
-            if record.iteration > 0 || !known {
-                let seconds = record.seconds + seconds_before;
-                history.push(IterationRecord { iteration, seconds, ..record.clone() });
-                if host.on_iteration(&Progress { stage, iteration, record }).is_break() {
-                    stopped = true;
-                    return ControlFlow::Break(());
+            let row =
+                IterationRecord { iteration, seconds: record.seconds + seconds_before, ..record.clone() };
+            match history.last_mut() {
+                // A later stage starts at the point where the one before it ended, but more may be asked of it.
+                Some(last) if record.iteration == 0 => {
+                    *last = IterationRecord { seconds: last.seconds, ..row }
+                }
+                _ => {
+                    history.push(row);
+                    if host.on_iteration(&Progress { stage, iteration, record }).is_break() {
+                        stopped = true;
+                        return ControlFlow::Break(());
+                    }
                 }
             }
             rule.observe(record, x)
