@@ -5,20 +5,29 @@ use std::path::Path;
 
 use super::laws;
 use super::subject::{Finding, Subject, Worst, larger};
-use crate::scenario::TerrainSpec;
+use crate::scenario::{Footholds, TerrainSpec};
 use crate::{Error, Result, terrain};
 
 /// The kernel of the smoothing is cut off at this many standard deviations.
 const KERNEL: f64 = 3.0;
+/// Spacing of the cells of a file, m, where only the file tells it.
+const UNKNOWN_SPACING: f64 = 0.25;
 /// A plane fitted under a kernel may leave the range of the heights below it by this fraction of that range.
 const OVERSHOOT: f64 = 0.25;
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     match &s.scenario.terrain {
         TerrainSpec::Heightmap(spec) => {
-            let smoothing = spec.smoothing(s.scenario.footholds());
+            let footholds = s.scenario.footholds();
+            // The plan's grid may be finer than that of the file.
+            let spacing = spec.spacing.unwrap_or(UNKNOWN_SPACING).max(s.plan.ground.spacing[0]);
+            let reach = match footholds {
+                Footholds::Patches => KERNEL * spec.smoothing(footholds, spacing),
+                // A spline through the smoothed cells.
+                Footholds::Anywhere => KERNEL * spec.smoothing(footholds, spacing) + spacing,
+            };
             if let Some(raw) = &s.plan.ground.raw {
-                findings.push((laws::SMOOTHING, Worst::overall(1e3 * beyond_raw(s, raw, smoothing))));
+                findings.push((laws::SMOOTHING, Worst::overall(1e3 * beyond_raw(s, raw, reach))));
             }
         }
         _ => findings.push((laws::TERRAIN, Worst::overall(1e3 * off_function(s)?))),
@@ -48,10 +57,11 @@ fn off_function(s: &Subject) -> Result<f64> {
     Ok(heights.fold(extent, larger))
 }
 
-/// By how much the smoothed heights leave the range of the raw ones around, m.
-fn beyond_raw(s: &Subject, raw: &[f64], smoothing: f64) -> f64 {
+/// By how much the smoothed heights leave the range of the raw ones around, up to `length` away, m.
+fn beyond_raw(s: &Subject, raw: &[f64], length: f64) -> f64 {
     let ground = &s.plan.ground;
-    let reach = ground.spacing.map(|spacing| (KERNEL * smoothing / spacing).ceil() as usize);
+    let most = ground.rows.max(ground.columns) as f64;
+    let reach = ground.spacing.map(|spacing| (length / spacing).ceil().min(most) as usize);
     let highest = |values: &[f64]| {
         let rows = extreme(values, ground.columns, reach[0]);
         transposed(&extreme(&transposed(&rows, ground.columns), ground.rows, reach[1]), ground.rows)
