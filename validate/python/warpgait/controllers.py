@@ -18,9 +18,7 @@ from .model import Indices
 from .reference import Reference
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
-FRICTION_USED = (
-    0.9  # fraction of the friction that the controller uses; a foot at the edge of the cone slides, and chatters on curved ground
-)
+FRICTION_USED = 0.95  # fraction of the friction that the controller uses; at the edge of the cone a foot slides
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
 EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touch-down
 EARLY = 0.6  # fraction of a swing after which a contact is the touch-down: the foot stands
