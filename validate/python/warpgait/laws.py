@@ -32,6 +32,7 @@ def check(path: Path) -> Laws:
     metrics = []
     for row in found["checks"]:
         value = math.nan if row["value"] is None else float(row["value"])
-        criterion = Criterion(row["name"], row["unit"], row["limit"], row["limit"])
+        unit = "" if row["unit"] == "1" else row["unit"]
+        criterion = Criterion(row["name"], unit, row["limit"], row["limit"])
         metrics.append(Metric(CHECK, criterion, value, row.get("time"), row.get("foot")))
     return Laws(tuple(metrics), tuple(found["remarks"]))

@@ -194,16 +194,19 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     if settings.check:
         say("check")
         found = laws.check(plan.path)
+    # What breaks laws may overflow anywhere, of which NumPy would warn.
+    quiet: Any = "ignore" if found.broken else None
     try:
-        robot = _robot(plan, settings.model)
-        say("open loop")
-        world = _world_of(plan, robot, plan.terrain, settings)
-        index = indices(world, plan.foot_names)
-        analysis = analyze(plan, robot.model, world, index)
-        metrics = judge_open_loop(plan, analysis, robot.index)
-        simulations = _Trials(plan, robot, world, analysis, settings)
-        metrics.append(judge_collisions(OPEN_LOOP, simulations.collision.find(plan.t, analysis.qpos)))
-        trials = simulations.run(say)
+        with np.errstate(all=quiet):
+            robot = _robot(plan, settings.model)
+            say("open loop")
+            world = _world_of(plan, robot, plan.terrain, settings)
+            index = indices(world, plan.foot_names)
+            analysis = analyze(plan, robot.model, world, index)
+            metrics = judge_open_loop(plan, analysis, robot.index)
+            simulations = _Trials(plan, robot, world, analysis, settings)
+            metrics.append(judge_collisions(OPEN_LOOP, simulations.collision.find(plan.t, analysis.qpos)))
+            trials = simulations.run(say)
     except InputError:
         raise
     except Exception as error:
