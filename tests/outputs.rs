@@ -108,6 +108,22 @@ fn a_failed_drawing_leaves_the_plan_and_its_exit_code() {
     warpgait::plan::Plan::read(&at("flat.plan.npz")).unwrap();
 }
 
+/// A limit on the size of files stands for a full disk.
+#[test]
+fn a_full_disk_leaves_the_old_file() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("p.plan.npz"), "old").unwrap();
+    let before = content(folder.path());
+    let program = env!("CARGO_BIN_EXE_warpgait");
+    let solve = format!("trap '' XFSZ; ulimit -f 8; {program} solve flat.toml -o p.plan.npz --quiet");
+    let run = Command::new("sh").current_dir(folder.path()).args(["-c", &solve]).output().unwrap();
+    let said = String::from_utf8(run.stderr).unwrap();
+    assert_eq!(run.status.code(), Some(2), "{said}");
+    assert!(said.contains("p.plan.npz: cannot be written: File too large"), "{said}");
+    assert_eq!(content(folder.path()), before);
+}
+
 #[test]
 fn a_full_standard_output_is_an_error_and_a_closed_one_is_not() {
     let folder = folder();

@@ -9,7 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::npy::{self, Header};
-use super::output::Pending;
+use super::output::{Pending, failed};
 use crate::{Error, Result};
 
 /// All members that are read may take this many bytes: two grounds of 4096 x 4096 heights, and as much again.
@@ -91,10 +91,10 @@ impl NpzWriter {
         }
         let header = Header { dtype: dtype.into(), fortran_order: false, shape };
         let header = header.write().map_err(|e| Error::Internal(format!("{name}: {e}")))?;
-        let at = |e: std::io::Error| Error::io(&self.target, e);
+        let at = |e: ZipError| failed(&self.target, &io_error(e));
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
-        self.zip.start_file(format!("{name}.npy"), options).map_err(|e| at(e.into()))?;
-        self.zip.write_all(&header).and_then(|()| self.zip.write_all(&bytes)).map_err(at)
+        self.zip.start_file(format!("{name}.npy"), options).map_err(at)?;
+        self.zip.write_all(&header).and_then(|()| self.zip.write_all(&bytes)).map_err(|e| at(e.into()))
     }
 
     /// Closes the archive and gives it the name of its target.
@@ -103,9 +103,8 @@ impl NpzWriter {
     /// When it cannot be written; what was there then stays.
     pub fn finish(self) -> Result<()> {
         let Self { zip, target } = self;
-        let at = |e: std::io::Error| Error::io(&target, e);
-        let buffer = zip.finish().map_err(|e| at(e.into()))?;
-        buffer.into_inner().map_err(|e| at(e.into_error()))?.commit()
+        let buffer = zip.finish().map_err(|e| failed(&target, &io_error(e)))?;
+        buffer.into_inner().map_err(|e| failed(&target, e.error()))?.commit()
     }
 }
 
@@ -272,6 +271,14 @@ fn in_c_order<T: Clone>(shape: &[usize], values: &[T]) -> Vec<T> {
         at
     };
     (0..values.len()).map(|flat| values[place(flat)].clone()).collect()
+}
+
+/// What the operating system reported, if it did.
+fn io_error(error: ZipError) -> std::io::Error {
+    match error {
+        ZipError::Io(error) => error,
+        other => std::io::Error::other(other),
+    }
 }
 
 fn at_member(file: &str, member: &str, what: &dyn std::fmt::Display) -> Error {

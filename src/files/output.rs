@@ -119,8 +119,7 @@ impl Pending {
 
     /// The error of a failed write.
     pub fn error(&self, error: &io::Error) -> Error {
-        let kept = if self.target.about.is_some() { "; what was there is unchanged" } else { "" };
-        refusal(&self.shown, &format!("{error}{kept}"))
+        failed(&self.shown, error)
     }
 }
 
@@ -299,6 +298,11 @@ pub(super) fn kind(about: &Metadata) -> &'static str {
 
 fn refusal(shown: &Path, why: &dyn std::fmt::Display) -> Error {
     Error::input(format!("{}: cannot be written: {why}", shown.display()))
+}
+
+/// The error of a failed write, after which there is what was there before.
+pub(super) fn failed(shown: &Path, error: &io::Error) -> Error {
+    refusal(shown, &format!("{error}; nothing was replaced"))
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
         f"write_text(Path({str(tmp_path / 'file')!r}), 'x' * 2000)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 1 and "File too large" in done.stderr
+    assert done.returncode == 1 and "file: cannot be written: File too large; nothing was replaced" in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["file"] and (tmp_path / "file").read_text() == "old"
 
 

@@ -160,6 +160,8 @@ def replacing(target: Path) -> Iterator[Path]:
         yield temporary
         os.fsync(descriptor)
         temporary.replace(found.path)
+    except OSError as error:
+        raise _refusal(target, f"{error.strerror}; nothing was replaced") from error
     finally:
         os.close(descriptor)
         temporary.unlink(missing_ok=True)
