@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// An input may take this long …
-const MOST_TIME: Duration = Duration::from_secs(5);
+use warpgait::bench::clock::processor_seconds_of;
+
+/// An input may take this much processor time, s, which other load on the machine does not change …
+const MOST_TIME: f64 = 5.0;
 /// … and this much memory, bytes.
 const MOST_MEMORY: u64 = 500_000_000;
 /// An input that takes this long is kept, and ends the program.
@@ -21,7 +23,7 @@ static RUNNING: Mutex<Option<(Instant, PathBuf, Vec<u8>)>> = Mutex::new(None);
 pub struct Guard {
     reader: &'static str,
     failures: Vec<String>,
-    slowest: Duration,
+    slowest: f64,
     inputs: u64,
     /// The largest memory so far, bytes.
     peak: u64,
@@ -37,7 +39,7 @@ impl Guard {
             std::thread::spawn(end_what_hangs);
         });
         let peak = peak_memory();
-        Self { reader, failures: Vec::new(), slowest: Duration::ZERO, inputs: 0, peak, base: peak, _one: one }
+        Self { reader, failures: Vec::new(), slowest: 0.0, inputs: 0, peak, base: peak, _one: one }
     }
 
     /// Runs a reader on an input.
@@ -45,10 +47,10 @@ impl Guard {
         let kept = PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
             .with_file_name("fuzz")
             .join(format!("{}-{number}", self.reader));
-        let start = Instant::now();
-        *running() = Some((start, kept.clone(), input.to_vec()));
+        let start = processor_seconds();
+        *running() = Some((Instant::now(), kept.clone(), input.to_vec()));
         let panicked = catch_unwind(AssertUnwindSafe(read)).is_err();
-        let took = start.elapsed();
+        let took = processor_seconds() - start;
         *running() = None;
         let memory = peak_memory().saturating_sub(self.peak.max(self.base));
         self.peak = self.peak.max(peak_memory());
@@ -56,7 +58,7 @@ impl Guard {
         self.inputs += 1;
         let why = match (panicked, took > MOST_TIME, memory > MOST_MEMORY) {
             (true, ..) => "panics".to_owned(),
-            (_, true, _) => format!("takes {:.1} s", took.as_secs_f64()),
+            (_, true, _) => format!("takes {took:.1} s"),
             (.., true) => format!("takes {} MB", memory / 1_000_000),
             _ => return,
         };
@@ -70,7 +72,7 @@ impl Guard {
             self.reader,
             self.inputs,
             self.failures.len(),
-            self.slowest.as_secs_f64(),
+            self.slowest,
             (self.peak - self.base) / 1_000_000
         );
         assert!(self.failures.is_empty(), "{}", self.failures.join("\n"));
@@ -97,6 +99,11 @@ fn end_what_hangs() {
             std::process::abort();
         }
     }
+}
+
+/// Of this process, which runs one reader at a time.
+fn processor_seconds() -> f64 {
+    processor_seconds_of(std::process::id()).unwrap_or(0.0)
 }
 
 /// The largest memory that this process has had in RAM, bytes; zero where Linux does not tell.
