@@ -253,6 +253,9 @@ fn solve_refuses_bad_input_before_computing() {
     write("malformed.toml", &FLAT.replace("[start]", "[start"));
     write("unknown.toml", &FLAT.replace("spacing", "spaceing"));
     write("outside.toml", &FLAT.replace("[0.3, 0.0]", "[9.0, 0.0]"));
+    write("feet.toml", &FLAT.replace("[0.3, 0.0]", "[1.4, 0.0]"));
+    write("degrees.toml", &FLAT.replace("[0.3, 0.0]", "[0.3, 0.0]\nyaw = 90.0"));
+    write("far.toml", &FLAT.replace("1.5, -1.0", "9.0, -1.0").replace("[0.3, 0.0]", "[5.0, 0.0]"));
     write("nan.toml", &FLAT.replace("3.0\n", "nan\n"));
     write("robot.toml", &FLAT.replace("anymal_towr", "anymal_x"));
     write(
@@ -268,6 +271,15 @@ fn solve_refuses_bad_input_before_computing() {
     solve(&["malformed.toml"], &["malformed.toml:9: not TOML"]);
     solve(&["unknown.toml"], &["unknown.toml:8: terrain.spaceing: unknown key; did you mean `spacing`?"]);
     solve(&["outside.toml"], &["outside.toml:12: goal.position: given [9, 0], outside the terrain"]);
+    solve(
+        &["feet.toml"],
+        &["feet.toml:12: goal.position: given [1.4, 0], where foot LF would stand 0.240 m outside"],
+    );
+    solve(
+        &["degrees.toml"],
+        &["degrees.toml:13: goal.yaw: given 90, allowed: -2π to 2π rad; 90° are 1.5708 rad"],
+    );
+    solve(&["far.toml"], &["far.toml:12: goal.position: 5.00 m from the start; in 3 s", "set horizon to "]);
     solve(&["nan.toml"], &["nan.toml:1: horizon: given nan"]);
     solve(&["robot.toml"], &["anymal_x", "anymal_towr"]);
     solve(&["flat.toml", "-o", "no/such/a.plan.npz"], &["no/such/a.plan.npz", "cannot be written"]);

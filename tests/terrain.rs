@@ -234,7 +234,7 @@ fn the_first_row_of_an_image_is_the_largest_y_and_its_origin_is_the_center() {
 }
 
 /// An `.npy` file of version 1.0, written by hand.
-fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
+pub fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
     let order = if fortran { "True" } else { "False" };
     let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
     header += &" ".repeat(64 - (10 + header.len() + 1) % 64);

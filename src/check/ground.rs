@@ -155,7 +155,15 @@ mod tests {
     fn sampled(n: usize, spacing: f64, h: impl Fn(f64, f64) -> f64) -> GroundGrid {
         let height =
             (0..n * n).map(|i| h((i % n) as f64 * spacing - 1.0, (i / n) as f64 * spacing - 1.0)).collect();
-        GroundGrid { rows: n, columns: n, origin: [-1.0; 2], spacing: [spacing; 2], height, raw: None }
+        GroundGrid {
+            rows: n,
+            columns: n,
+            origin: [-1.0; 2],
+            spacing: [spacing; 2],
+            height,
+            raw: None,
+            unknown: None,
+        }
     }
 
     #[test]
@@ -191,6 +199,7 @@ mod tests {
             spacing: [1.0; 2],
             height: vec![0.0, 1.0, 2.0, 1.0, 2.0, 3.0],
             raw: None,
+            unknown: None,
         };
         let ground = PlanGround::smooth(&grid);
         assert!((ground.height(0.5, 0.5) - 1.0).abs() < 1e-12);

@@ -96,6 +96,10 @@ laws! {
     SWING_EDGE = "swing_edge", "mm", Some(0.1), None,
         "a swinging foot, as a ball, stays above raw ground with edges, or is no deeper in it than next to it, where it stands \
          (allowance for rounding: 0.1 mm)";
+    UNKNOWN_GROUND = "unknown_ground", "1", Some(0.0), None,
+        "footholds where the scan has no data (contact.on_known_ground)";
+    GROUND_MOVED = "ground_moved", "mm", Some(15.0), None,
+        "how far smoothing moved the ground under a foothold, which may be anywhere";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
     START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the goal, at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
@@ -107,6 +111,8 @@ laws! {
     ANGULAR_SPEED = "angular_speed_max", "rad/s", None, Some(1.0), "largest angular speed of the base";
     FORCE_RATE = "force_rate_rms", "m g/s", None, None, "rate of change of the forces, root mean square";
     LEAST_APEX = "swing_apex_least", "mm", None, None, "the lowest apex of a swing above the ground";
+    UNKNOWN_STANCES = "unknown_stances", "1", None, None,
+        "footholds where the scan has no data, without contact.on_known_ground";
     LEAST_CLEARANCE = "base_clearance_least", "mm", None, None, "least distance of the torso's underside from the ground";
 }
 

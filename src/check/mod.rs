@@ -10,6 +10,7 @@ mod derivatives;
 mod dynamics;
 mod ground;
 mod laws;
+mod measured;
 mod motion;
 mod patches;
 mod splines;
@@ -62,6 +63,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     dynamics::findings(&subject, &mut findings, &mut residuals);
     contact::findings(&subject, &mut findings, &mut residuals);
     patches::findings(&subject, &mut findings);
+    measured::findings(&subject, &mut findings);
     motion::findings(&subject, &mut findings, &mut residuals);
 
     let (mut rows, mut figures) = (Vec::new(), Vec::new());

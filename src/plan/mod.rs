@@ -118,6 +118,8 @@ pub struct GroundGrid {
     pub height: Vec<f64>,
     /// The same grid before smoothing, where the input was a raster.
     pub raw: Option<Vec<f64>>,
+    /// The same grid: where nothing was measured and the heights are a guess; none if there is no such place.
+    pub unknown: Option<Vec<bool>>,
 }
 
 /// The `meta` member of a plan.

@@ -205,6 +205,11 @@ fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
     }
     let raw =
         if npz.has("heightfield_raw") { Some(npz.f64("heightfield_raw", &[rows, columns])?) } else { None };
+    let unknown = if npz.has("heightfield_unknown") {
+        Some(npz.bool("heightfield_unknown", &[rows, columns])?)
+    } else {
+        None
+    };
     Ok(GroundGrid {
         rows,
         columns,
@@ -212,6 +217,7 @@ fn read_ground(npz: &mut NpzReader) -> Result<GroundGrid> {
         spacing: [spacing[0], spacing[1]],
         height,
         raw,
+        unknown,
     })
 }
 

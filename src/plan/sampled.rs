@@ -142,6 +142,7 @@ fn ground_grid(ground: &Ground) -> GroundGrid {
         spacing: grid.spacing,
         height: ground.field.samples().to_vec(),
         raw: ground.raw.clone(),
+        unknown: ground.unknown.clone(),
     }
 }
 

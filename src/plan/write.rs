@@ -55,6 +55,9 @@ impl Plan {
         if let Some(raw) = &ground.raw {
             npz.add_f64("heightfield_raw", &shape, raw.iter().copied())?;
         }
+        if let Some(unknown) = &ground.unknown {
+            npz.add_bool("heightfield_unknown", &shape, unknown)?;
+        }
         if !self.patches.is_empty() {
             let stances = self.patches.iter().map(Vec::len).max().unwrap_or(0);
             let padded = self.patches.iter().flat_map(|patches| {
@@ -152,6 +155,9 @@ impl Plan {
         )?;
         if let Some(raw) = &ground.raw {
             ensure("heightfield_raw", raw.len() == cells, raw)?;
+        }
+        if let Some(unknown) = &ground.unknown {
+            ensure("heightfield_unknown", unknown.len() == cells, [])?;
         }
         let feet = self.patches.len();
         ensure("patch_corners", feet == 0 || feet == e, self.patches.iter().flatten().flatten().flatten())?;

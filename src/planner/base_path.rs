@@ -46,7 +46,7 @@ impl<'a> BasePath<'a> {
     /// When a pose has no preimage under the map, or a foot cannot reach the ground at the start.
     pub fn new(scenario: &Scenario, model: &'a Model) -> Result<Self> {
         let layout = &model.layout;
-        let yaw = start_yaw(scenario);
+        let yaw = scenario.start_yaw();
         let goal_yaw = scenario.goal.yaw.unwrap_or(yaw);
         let pose = |xy: [f64; 2], yaw: f64| standing_pose(&model.nominal, &model.surfaces.posture, xy, yaw);
         let start = pose(scenario.start.position, yaw);
@@ -190,14 +190,6 @@ pub fn middle(stance: &Stance, last: f64) -> f64 {
     } else {
         0.5 * (stance.start + stance.end)
     }
-}
-
-/// Heading at the start: the scenario's, or toward the goal.
-pub fn start_yaw(scenario: &Scenario) -> f64 {
-    scenario.start.yaw.unwrap_or_else(|| {
-        let d = [0, 1].map(|c| scenario.goal.position[c] - scenario.start.position[c]);
-        if d[0].hypot(d[1]) < 1e-9 { 0.0 } else { d[1].atan2(d[0]) }
-    })
 }
 
 /// Fraction of the way covered at time t: constant speed with parabolic ends between `from` and `to`.

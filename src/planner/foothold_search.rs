@@ -352,18 +352,28 @@ impl<'a> Search<'a> {
         let reach = WINDOW * self.model.reach[foot].half_size[0];
         let [x_min, x_max, y_min, y_max] = self.contact.grid().extent();
         let inside = (x_min..=x_max).contains(&place.x) && (y_min..=y_max).contains(&place.y);
-        let why = if inside {
-            "the ground there is a gap, too rough or too steep"
-        } else {
-            "that is beyond the terrain"
+        let why = match (inside, self.contact.has_holes()) {
+            (true, true) => "the ground there is a gap, too rough, too steep, or was not measured",
+            (true, false) => "the ground there is a gap, too rough or too steep",
+            (false, _) => "that is beyond the terrain",
         };
         Error::input(format!(
-            "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: {why}; choose another way (start, goal)",
+            "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: {why}; {}",
             self.model.foot_names[foot],
             place.x,
             place.y,
-            sample * self.model.layout.time_step
+            sample * self.model.layout.time_step,
+            advice(self.contact)
         ))
+    }
+}
+
+/// What to do where there are no footholds.
+pub fn advice(contact: &ContactGround) -> &'static str {
+    if contact.has_holes() {
+        "choose another way (start, goal) or another gait; feet keep off ground without data unless contact.on_known_ground = false"
+    } else {
+        "choose another way (start, goal) or another gait"
     }
 }
 

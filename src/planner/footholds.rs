@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::base_path::BasePath;
-use super::foothold_search::{Place, Search, largest_step, obstacle};
+use super::foothold_search::{Place, Search, advice, largest_step, obstacle};
 use crate::nlp::Model;
 use crate::scenario::Scenario;
 use crate::terrain::ContactGround;
@@ -60,12 +60,13 @@ fn ensure_walkable(
                 continue;
             };
             return Err(Error::input(format!(
-                "foot {name} would have to step from x = {:.2}, y = {:.2} to x = {:.2}, y = {:.2} m at {:.1} s, {what}; choose another way (start, goal) or another gait",
+                "foot {name} would have to step from x = {:.2}, y = {:.2} to x = {:.2}, y = {:.2} m at {:.1} s, {what}; {}",
                 a.x,
                 a.y,
                 b.x,
                 b.y,
-                layout.feet[foot].stances[j].stance.end * layout.time_step
+                layout.feet[foot].stances[j].stance.end * layout.time_step,
+                advice(contact)
             )));
         }
         let reach = &model.reach[foot];
@@ -77,10 +78,11 @@ fn ensure_walkable(
                 let beyond = Vector3::from_fn(|d, _| beyond(d)).norm();
                 if beyond > hopeless {
                     return Err(Error::input(format!(
-                        "foot {name} finds nothing to stand on in its reach at {:.1} s: the best place, x = {:.2}, y = {:.2} m, is {beyond:.2} m too far; choose another way (start, goal) or another gait",
+                        "foot {name} finds nothing to stand on in its reach at {:.1} s: the best place, x = {:.2}, y = {:.2} m, is {beyond:.2} m too far; {}",
                         k * layout.time_step,
                         place.point.x,
-                        place.point.y
+                        place.point.y,
+                        advice(contact)
                     )));
                 }
             }

@@ -8,6 +8,7 @@
 //! | `foothold_search` | the search for them |
 //! | `steps` | how many steps a motion takes over edges, and where |
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
+//! | `travel` | whether the goal is within range at all |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | [`stage`] | which stages there are |
@@ -33,6 +34,7 @@ mod standing;
 mod steps;
 mod stopping;
 mod threads;
+mod travel;
 pub mod violation;
 
 pub use motion::{Motion, Seconds};

@@ -24,6 +24,8 @@ use crate::{Error, Result};
 
 /// Steps of a continuation with `solver.continuation = "auto"`.
 const CONTINUATION_STEPS: u32 = 3;
+/// Ground whose heights differ by less than this is level, m.
+const LEVEL: f64 = 1e-6;
 /// Fraction of the iterations that the plain solve may take when a continuation may follow.
 const PLAIN_FRACTION: f64 = 0.5;
 
@@ -95,6 +97,7 @@ pub trait Host {
 pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
     let steps = match solver.continuation {
+        _ if is_level(&task.surfaces.posture) => 0,
         // Patches of a lower ground are not those of the whole one.
         _ if task.surfaces.have_edges() => 0,
         Continuation::Mode(ContinuationMode::Off) => 0,
@@ -105,15 +108,30 @@ pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let fraction = if steps == 0 && !over_edges { 1.0 } else { PLAIN_FRACTION };
     let budget = (solver.max_iterations as f64 * fraction) as usize;
     let mut solve = Solve::new(task, host);
-    let mut end = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
-    if !end.feasible && !end.interrupted {
-        if over_edges {
-            end = solve.joints_last(solver.max_iterations)?;
-        } else if steps > 0 {
-            end = solve.continuation(steps, end)?;
-        }
+    let first = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
+    if first.feasible || first.interrupted {
+        return Ok(solve.finish(first));
     }
-    Ok(solve.finish(end))
+    let (how, second) = match (over_edges, steps) {
+        (true, _) => ("with the joints last", Some(solve.joints_last(solver.max_iterations)?)),
+        (false, steps) => ("with a continuation", solve.continuation(steps)?),
+    };
+    Ok(solve.finish(match second {
+        None => first,
+        Some(second) if second.feasible && second.stage.is_whole() => second,
+        // Why nothing was found shows best in the solve that was not made easier.
+        Some(second) => StageEnd {
+            status: format!("{}; {how}: {}", first.status, second.status),
+            interrupted: second.interrupted,
+            ..first
+        },
+    }))
+}
+
+/// Whether nothing could grow in a continuation.
+fn is_level(ground: &Heightfield) -> bool {
+    let heights = ground.samples();
+    heights.iter().all(|h| (h - heights[0]).abs() < LEVEL)
 }
 
 /// Where a stage starts.
@@ -127,6 +145,7 @@ enum Start {
 
 /// How a stage ended.
 struct StageEnd {
+    stage: Stage,
     problem: GaitProblem,
     x: Vec<f64>,
     feasible: bool,
@@ -141,6 +160,8 @@ struct Solve<'a> {
     start: Instant,
     history: Vec<IterationRecord>,
     iterations: usize,
+    /// The user asked to stop between stages.
+    interrupted: bool,
     linear_solver: LinearSolver,
     seconds: Seconds,
 }
@@ -153,6 +174,7 @@ impl<'a> Solve<'a> {
             start: Instant::now(),
             history: Vec::new(),
             iterations: 0,
+            interrupted: false,
             linear_solver: task.scenario.solver.linear_solver,
             seconds: Seconds::default(),
         }
@@ -197,19 +219,20 @@ impl<'a> Solve<'a> {
         self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
     }
 
-    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the costs.
-    fn continuation(&mut self, steps: u32, failed: StageEnd) -> Result<StageEnd> {
+    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the
+    /// costs. None when no iterations are left, or the user asked to stop, before the first of them.
+    fn continuation(&mut self, steps: u32) -> Result<Option<StageEnd>> {
         let scenario = self.task.scenario;
-        let mut last = failed;
+        let mut last: Option<StageEnd> = None;
         let mut from: Option<Vec<f64>> = None;
         for step in 1..=steps {
             let left = scenario.solver.max_iterations.saturating_sub(self.iterations);
-            if left == 0 || last.interrupted {
+            if left == 0 || last.as_ref().is_some_and(|end| end.interrupted) {
                 break;
             }
             let stage = Stage::Continuation { step, steps };
             let Some(model) = self.scaled_model(stage)? else {
-                last.interrupted = true;
+                self.interrupted = true;
                 break;
             };
             let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
@@ -219,12 +242,13 @@ impl<'a> Solve<'a> {
                 start = Start::Feasible;
             }
             let effort = if stage.is_whole() { scenario.solver.effort } else { Effort::Feasible };
-            last = self.stage(stage, model, x, start, effort, left)?;
-            if !last.feasible && !stage.is_whole() {
+            let mut end = self.stage(stage, model, x, start, effort, left)?;
+            if !end.feasible && !stage.is_whole() {
                 let percent = 100.0 * stage.height_fraction();
-                last.status = format!("{} with the terrain at {percent:.0} % of its height", last.status);
+                end.status = format!("{} with the terrain at {percent:.0} % of its height", end.status);
             }
-            from = Some(last.x.clone());
+            from = Some(end.x.clone());
+            last = Some(end);
         }
         Ok(last)
     }
@@ -306,10 +330,11 @@ impl<'a> Solve<'a> {
         let x = rule.best(solution.x, solution.objective, last_feasible);
         let feasible = violation::is_feasible(&mut problem, &x, tolerance);
         let status = status(solution.status, feasible, satisfied, with_costs);
-        Ok(StageEnd { problem, x, feasible, interrupted, status })
+        Ok(StageEnd { stage, problem, x, feasible, interrupted, status })
     }
 
     fn finish(mut self, mut end: StageEnd) -> Motion {
+        end.interrupted |= self.interrupted;
         let violations = violation::table(&mut end.problem, &end.x);
         self.seconds.total = self.start.elapsed().as_secs_f64();
         // Plans are sampled from the motion as it is, at the switches that were found.

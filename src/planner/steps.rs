@@ -1,6 +1,7 @@
 //! How many steps a motion takes over ground with edges, and where they are.
 
 use super::footholds::{Assignment, assign};
+use super::travel::ensure_within_range;
 use crate::Result;
 use crate::nlp::Model;
 use crate::robot::Robot;
@@ -28,10 +29,16 @@ impl Steps {
     /// better, such as on a staircase with short treads.
     ///
     /// # Errors
-    /// Those of the gait and, if no number of steps will do, what is wrong with the usual number: which foot finds nothing to stand on,
+    /// Those of the gait, for a goal out of range, and, if no number of steps will do, what is wrong with the usual number: which foot finds nothing to stand on,
     /// where and when.
     pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
         let usual = Gait::of(scenario, robot)?;
+        let mut possible = vec![usual.clone()];
+        if surfaces.have_edges() {
+            let quicker = |factor: &f64| Gait::with_more_steps(scenario, robot, *factor)?.ok();
+            possible.extend(SHORTER_CYCLES.iter().filter_map(quicker));
+        }
+        ensure_within_range(scenario, robot, &possible)?;
         let Some(contact) = &surfaces.contact else { return Ok(Self { gait: usual, patches: Vec::new() }) };
         // In ambient space, so that all formulations get the same patches.
         let spaces = Spaces { base: Space::Direct, feet: Space::Direct };

@@ -16,6 +16,8 @@ const MIN_HEIGHT_RANGE: f64 = 0.1;
 pub(super) const OVERLAP: f64 = 0.4;
 /// Segments of a profile, about as many as pixels.
 pub(super) const PROFILE: u32 = 550;
+/// Style of ground without data.
+const UNKNOWN: &str = "fill=\"#6b7a99\" fill-opacity=\"0.55\"";
 /// Style of what cannot be stood on.
 const CLOSED: &str = "fill=\"url(#hatching)\"";
 
@@ -30,7 +32,12 @@ impl DrawnGround<'_> {
         self.surfaces.contact.as_deref()
     }
 
-    /// The ground within a frame: bands of height and, hatched, what cannot be stood on.
+    /// Whether there is ground without data.
+    pub fn has_unknown(&self) -> bool {
+        self.grid.unknown.is_some()
+    }
+
+    /// The ground within a frame: bands of height, what has no data, and, hatched, what cannot be stood on.
     pub fn draw(&self, svg: &mut Svg, axes: &Axes) {
         let shades = Shades::over(axes, self.grid);
         svg.clipped(axes.frame, |svg| {
@@ -40,6 +47,12 @@ impl DrawnGround<'_> {
                     runs(axes.frame, OVERLAP, |cell| shades.band(cell) == Some(band)),
                     &band_style(band),
                 );
+            }
+            if let Some(unknown) = &self.grid.unknown {
+                let without_data: Vec<bool> = places(axes)
+                    .map(|place| nearest(self.grid, place).is_some_and(|cell| unknown[cell]))
+                    .collect();
+                svg.rects(runs(axes.frame, 0.0, |cell| without_data[cell]), UNKNOWN);
             }
             if let Some(contact) = self.contact() {
                 let steppable: Vec<bool> = places(axes).map(|[x, y]| contact.is_steppable([x, y])).collect();
@@ -64,6 +77,12 @@ impl DrawnGround<'_> {
             let inside = self.surfaces.have_edges() && height(self.grid, x, y).is_some();
             inside.then(|| self.surfaces.feet.height(x, y))
         })
+    }
+
+    /// A sample of ground without data, for a legend.
+    pub fn unknown_sample(svg: &mut Svg, frame: [f64; 4]) {
+        svg.rect(frame, "fill=\"#f3eede\"");
+        svg.rect(frame, &format!("{UNKNOWN} stroke=\"#888\" stroke-width=\"0.6\""));
     }
 
     /// A sample of what is hatched, for a legend.
@@ -98,6 +117,15 @@ pub(super) fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
     let low = h(i, j) * (1.0 - a) + h(i + 1, j) * a;
     let high = h(i, j + 1) * (1.0 - a) + h(i + 1, j + 1) * a;
     Some(low * (1.0 - b) + high * b)
+}
+
+/// The sample nearest to a place; none outside the grid.
+fn nearest(ground: &GroundGrid, place: [f64; 2]) -> Option<usize> {
+    let at = |c: usize, count: usize| {
+        let k = ((place[c] - ground.origin[c]) / ground.spacing[c]).round();
+        (k >= 0.0 && k < count as f64).then_some(k as usize)
+    };
+    Some(at(1, ground.rows)? * ground.columns + at(0, ground.columns)?)
 }
 
 /// The centers of the `RASTER` × `RASTER` cells of a frame, row by row from the top.

@@ -28,7 +28,7 @@ pub fn sheet(plan: &Plan, surfaces: &Surfaces) -> String {
     heading(&mut svg, plan);
     from_above(&mut svg, plan, &ground, [70.0, 110.0, 540.0, 480.0]);
     from_the_side(&mut svg, plan, &ground, [700.0, 110.0, 550.0, 260.0]);
-    legend(&mut svg, plan, surfaces.have_edges());
+    legend(&mut svg, plan, &ground);
     contacts(&mut svg, plan, [700.0, 450.0, 550.0, 140.0]);
     normal_forces(&mut svg, plan, [70.0, 680.0, 720.0, 270.0]);
     convergence(&mut svg, plan, [880.0, 680.0, 370.0, 270.0]);
@@ -62,7 +62,8 @@ fn heading(svg: &mut Svg, plan: &Plan) {
 }
 
 /// Names and samples of what is drawn, left for the view from above and right for all panels.
-fn legend(svg: &mut Svg, plan: &Plan, edges: bool) {
+fn legend(svg: &mut Svg, plan: &Plan, ground: &DrawnGround) {
+    let edges = ground.surfaces.have_edges();
     let name =
         |svg: &mut Svg, x: f64, name: &str| svg.text([x + 30.0, LEGEND], name, Font::TICK.anchored("start"));
     let line = |svg: &mut Svg, x: f64, style: &str, what: &str| {
@@ -89,6 +90,12 @@ fn legend(svg: &mut Svg, plan: &Plan, edges: bool) {
         x += 140.0;
         DrawnGround::closed_sample(svg, box_at(x));
         name(svg, x, "no foot can stand here");
+        x += 60.0;
+    }
+    if ground.has_unknown() {
+        x += 110.0;
+        DrawnGround::unknown_sample(svg, box_at(x));
+        name(svg, x, "no data");
     }
 }
 

@@ -3,6 +3,8 @@
 //! The schema has already checked keys, types and ranges. Only two kinds of refusal come later: what depends on the
 //! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
 
+use std::f64::consts::TAU;
+
 use super::format::{Formulation, Scenario};
 use super::gait::GaitKind;
 use super::map::MapMethod;
@@ -22,9 +24,10 @@ const PHASE_TOLERANCE: f64 = 1e-6;
 /// Refuses values that do not fit together. The scenario in a plan is checked without its robot, whose file may be gone.
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
     one_robot(document)?;
+    headings(document, scenario)?;
     terrain(document, scenario)?;
     if let Some(extent) = scenario.terrain.extent() {
-        inside(document, scenario, extent)?;
+        inside(document, scenario, robot, extent)?;
     }
     time_steps(document, scenario)?;
     law(document, scenario)?;
@@ -69,17 +72,48 @@ fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a start or goal outside the ground.
-pub(super) fn inside(document: &Document, scenario: &Scenario, extent: [f64; 4]) -> Result<()> {
-    let [x_min, x_max, y_min, y_max] = extent;
-    for (key, [x, y]) in
-        [("start.position", scenario.start.position), ("goal.position", scenario.goal.position)]
-    {
-        if !(x_min..=x_max).contains(&x) || !(y_min..=y_max).contains(&y) {
-            let what = format!(
-                "given [{x}, {y}], outside the terrain; allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m"
-            );
+/// Refuses headings that look like degrees.
+fn headings(document: &Document, scenario: &Scenario) -> Result<()> {
+    for (key, yaw) in [("start.yaw", scenario.start.yaw), ("goal.yaw", scenario.goal.yaw)] {
+        if let Some(yaw) = yaw.filter(|yaw| yaw.abs() > TAU) {
+            let what = format!("given {yaw}, allowed: -2π to 2π rad; {yaw}° are {:.4} rad", yaw.to_radians());
             return Err(document.error(key, what));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a start or goal at which the base or, where the robot is known, a foot at its nominal place is outside the ground.
+pub(super) fn inside(
+    document: &Document,
+    scenario: &Scenario,
+    robot: Option<&Robot>,
+    [x_min, x_max, y_min, y_max]: [f64; 4],
+) -> Result<()> {
+    let allowed = format!("allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m");
+    let beyond = |[x, y]: [f64; 2]| {
+        let along = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
+        along(x, x_min, x_max).hypot(along(y, y_min, y_max))
+    };
+    let yaw = scenario.start_yaw();
+    for (key, place, yaw) in [
+        ("start.position", scenario.start.position, yaw),
+        ("goal.position", scenario.goal.position, scenario.goal.yaw.unwrap_or(yaw)),
+    ] {
+        let [x, y] = place;
+        if beyond(place) > 0.0 {
+            return Err(document.error(key, format!("given [{x}, {y}], outside the terrain; {allowed}")));
+        }
+        for foot in robot.iter().flat_map(|robot| &robot.feet) {
+            let ([u, v, _], (sin, cos)) = (foot.nominal, yaw.sin_cos());
+            let outside = beyond([x + cos * u - sin * v, y + sin * u + cos * v]);
+            if outside > 0.0 {
+                let what = format!(
+                    "given [{x}, {y}], where foot {} would stand {outside:.3} m outside the terrain; for feet {allowed}",
+                    foot.name
+                );
+                return Err(document.error(key, what));
+            }
         }
     }
     Ok(())

@@ -74,6 +74,14 @@ impl Scenario {
         })
     }
 
+    /// Heading at the start: the one given, or toward the goal.
+    pub fn start_yaw(&self) -> f64 {
+        self.start.yaw.unwrap_or_else(|| {
+            let d = [0, 1].map(|c| self.goal.position[c] - self.start.position[c]);
+            if d[0].hypot(d[1]) < 1e-9 { 0.0 } else { d[1].atan2(d[0]) }
+        })
+    }
+
     /// Where feet may stand.
     pub fn footholds(&self) -> Footholds {
         self.contact.footholds.unwrap_or(match self.terrain {

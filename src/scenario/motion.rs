@@ -92,6 +92,9 @@ pub struct ContactSpec {
     pub cone: Cone,
     /// Where feet may stand; default: patches on a heightmap, anywhere on a terrain that is a function.
     pub footholds: Option<Footholds>,
+    /// Feet stand on measured ground only, not where a scan has no data and the ground is a guess. With `footholds = "anywhere"` this
+    /// is checked, not planned for.
+    pub on_known_ground: bool,
     /// Largest slope |∇h| at a foothold; default: no limit.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub max_slope: Option<f64>,
@@ -107,6 +110,7 @@ impl Default for ContactSpec {
             friction_margin: 0.0,
             cone: Cone::Exact,
             footholds: None,
+            on_known_ground: true,
             max_slope: None,
             edge_margin: 0.03,
         }

@@ -348,8 +348,8 @@ pub struct HeightmapSpec {
     pub height_scale: Option<f64>,
     /// Values, as stored in the file, that stand for no data; in addition to NaN and to what the file tells.
     pub no_data: Option<Numbers>,
-    /// Standard deviation of the smoothing, m; at most 50 cells. Default with `contact.footholds = "patches"`: 0; else 1.5 cells or
-    /// 0.03 m, whichever is larger.
+    /// Standard deviation of the smoothing, m; at most 50 cells. Default with `contact.footholds = "patches"`: 0; else 1.5 cells, but
+    /// at least 0.03 and at most 0.06 m.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub smoothing: Option<f64>,
     /// x, y of the center of the file, m; default: what the file tells, else 0, 0.
@@ -365,6 +365,8 @@ impl HeightmapSpec {
     pub const SMOOTHING_CELLS: f64 = 1.5;
     /// … but at least this length, m: a foot does not feel anything finer.
     pub const SMOOTHING_LENGTH: f64 = 0.03;
+    /// … and at most this length, m, however coarse the scan: ground that is moved further under a foot is not the ground any more.
+    pub const SMOOTHING_CEILING: f64 = 0.06;
     /// Smoothing over more cells than this is refused; it would take minutes.
     pub const SMOOTHING_LIMIT: f64 = 50.0;
 
@@ -372,7 +374,9 @@ impl HeightmapSpec {
     pub fn smoothing(&self, footholds: Footholds, spacing: f64) -> f64 {
         let default = match footholds {
             Footholds::Patches => 0.0,
-            Footholds::Anywhere => (Self::SMOOTHING_CELLS * spacing).max(Self::SMOOTHING_LENGTH),
+            Footholds::Anywhere => {
+                (Self::SMOOTHING_CELLS * spacing).clamp(Self::SMOOTHING_LENGTH, Self::SMOOTHING_CEILING)
+            }
         };
         self.smoothing.unwrap_or(default.min(Self::SMOOTHING_LIMIT * spacing))
     }

@@ -173,6 +173,10 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             vec!["s.toml:8: goal.position: given [1, 9], outside"],
         ),
         (
+            with("position = [1.0, 1.0]", "position = [1.0, 1.0]\nyaw = 90.0"),
+            vec!["s.toml:9: goal.yaw: given 90, allowed: -2π to 2π rad; 90° are 1.5708 rad"],
+        ),
+        (
             with("position = [1.0, 1.0]", "yaw = 0.0"),
             vec!["s.toml:7: goal.position: missing; it must be an array of 2"],
         ),

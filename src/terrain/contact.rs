@@ -1,9 +1,10 @@
 //! Where on a raster a foot can stand.
 //!
 //! A cell is steppable if a plane fits the ground under the foot, if that plane is not too steep, and if nothing beside the
-//! foot rises so far above it that the foot would touch it on its way down.
+//! foot rises so far above it that the foot would touch it on its way down. Nor does a foot stand where a scan has no data, unless the
+//! hole is narrower than the foot.
 
-use super::morphology::{Offset, closed, disc, for_each_neighborhood};
+use super::morphology::{Offset, closed, disc, for_each_neighborhood, opened, widened};
 use super::patch::Patch;
 use crate::heightfield::Grid;
 
@@ -22,6 +23,8 @@ const ON_LINE: f64 = 1e-6;
 /// What a foot needs in order to stand, lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootNeeds {
+    /// Ground without data is a hole if a disc of this radius fits into it.
+    pub hole: f64,
     /// The ground must be even within this distance of the contact point …
     pub even: f64,
     /// … up to this difference from a plane.
@@ -49,11 +52,13 @@ pub struct ContactGround {
     steppable: Vec<bool>,
     /// From a cell to those that the ground under a foot on it depends on.
     under_foot: Vec<Offset>,
+    /// Some cells are not steppable because nothing was measured there.
+    has_holes: bool,
 }
 
 impl ContactGround {
-    /// Fits a plane around each cell and judges it.
-    pub fn new(grid: &Grid, heights: &[f64], needs: FootNeeds) -> Self {
+    /// Fits a plane around each cell and judges it. `unknown` tells where nothing was measured, if feet must not stand there.
+    pub fn new(grid: &Grid, heights: &[f64], unknown: Option<&[bool]>, needs: FootNeeds) -> Self {
         let planes = planes(grid, heights, needs.even);
         let mut steppable: Vec<bool> = planes.iter().map(|p| p[1].hypot(p[2]) <= needs.slope).collect();
         let mut rule_out = |around: &[Offset], fits: &dyn Fn(f64) -> bool| {
@@ -75,6 +80,12 @@ impl ContactGround {
         {
             *steppable &= filled - height <= needs.depth;
         }
+        let holes = unknown.map(|unknown| opened(grid, unknown, needs.hole));
+        if let Some(holes) = &holes {
+            for (steppable, near) in steppable.iter_mut().zip(widened(grid, holes, needs.even)) {
+                *steppable &= !near;
+            }
+        }
         // What lies beyond the border is not known.
         let border = grid.spacing.map(|s| (needs.beside / s).ceil() as usize);
         for (cell, steppable) in steppable.iter_mut().enumerate() {
@@ -82,7 +93,13 @@ impl ContactGround {
             let inside = |at: usize, count: usize, border: usize| at >= border && at + border < count;
             *steppable &= inside(column, grid.columns, border[0]) && inside(row, grid.rows, border[1]);
         }
-        Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable, under_foot }
+        let has_holes = holes.is_some_and(|holes| holes.contains(&true));
+        Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable, under_foot, has_holes }
+    }
+
+    /// Whether feet keep away from places because nothing was measured there.
+    pub fn has_holes(&self) -> bool {
+        self.has_holes
     }
 
     /// The raster.
@@ -279,6 +296,7 @@ mod tests {
 
     const GRID: Grid = Grid { origin: [-1.0, -1.0], spacing: [0.02, 0.02], columns: 101, rows: 101 };
     const NEEDS: FootNeeds = FootNeeds {
+        hole: 0.03,
         even: 0.033,
         roughness: 0.012,
         beside: 0.075,
@@ -289,7 +307,7 @@ mod tests {
     };
 
     fn ground(h: impl Fn(f64, f64) -> f64) -> ContactGround {
-        ContactGround::new(&GRID, &GRID.sample(|x, y| Ok(h(x, y))).expect("heights"), NEEDS)
+        ContactGround::new(&GRID, &GRID.sample(|x, y| Ok(h(x, y))).expect("heights"), None, NEEDS)
     }
 
     #[test]
@@ -310,6 +328,23 @@ mod tests {
         let plane = slope.planes[slope.cell_at([0.2, 0.1]).expect("a cell")];
         assert!((plane[0] - 0.08).abs() < 1e-12 && (plane[1] - 0.5).abs() < 1e-12);
         assert!(!ground(|x, _| 0.02 * (70.0 * x).sin()).is_steppable([0.0, 0.0]));
+    }
+
+    #[test]
+    fn feet_keep_away_from_ground_that_was_not_measured() {
+        let unknown = |width: f64| -> Vec<bool> {
+            let inside =
+                GRID.sample(|x, _| Ok(if x.abs() < 0.5 * width { 1.0 } else { 0.0 })).expect("heights");
+            inside.iter().map(|v| *v > 0.0).collect()
+        };
+        let flat = vec![0.0; GRID.len()];
+        let ground = |width: f64| ContactGround::new(&GRID, &flat, Some(&unknown(width)), NEEDS);
+        assert!(ground(0.03).is_steppable([0.0, 0.0]) && !ground(0.03).has_holes());
+        let wide = ground(0.3);
+        for (x, expected) in [(0.0, false), (0.14, false), (0.16, false), (0.20, true), (-0.20, true)] {
+            assert_eq!(wide.is_steppable([x, 0.0]), expected, "x = {x}");
+        }
+        assert!(wide.has_holes());
     }
 
     #[test]

@@ -5,8 +5,10 @@ use crate::error::{Error, Result};
 
 /// A hole counts as filled when a sweep moves no height by more than this fraction of the height range.
 const FILL_TOLERANCE: f64 = 1e-6;
-/// Limit on the sweeps; even a huge hole is smooth enough by then.
+/// Limit on the sweeps …
 const FILL_SWEEPS: usize = 5000;
+/// … and on their cells. A huge hole is smooth enough by then, since coarser levels start it well.
+const FILL_WORK: usize = 40_000_000;
 
 /// Replaces each NaN by the solution of Laplace's equation over its hole (free at the border of the raster) and returns
 /// how many there were.
@@ -39,7 +41,7 @@ fn fill_level(columns: usize, heights: &mut [f64], tolerance: f64) {
     for &i in &holes {
         heights[i] = half_at(half_columns, &half, i % columns, i / columns);
     }
-    for _ in 0..FILL_SWEEPS {
+    for _ in 0..FILL_SWEEPS.min(FILL_WORK.div_ceil(holes.len())) {
         let mut largest = 0.0_f64;
         for &i in &holes {
             let (column, row) = (i % columns, i / columns);

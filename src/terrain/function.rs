@@ -32,5 +32,5 @@ pub fn ground(kind: &'static str, domain: &Domain, h: impl Fn(f64, f64) -> Resul
             error.max, error.at[0], error.at[1]
         ));
     }
-    Ok(Ground { field, raw: None, report, inputs: Vec::new() })
+    Ok(Ground { field, raw: None, unknown: None, report, inputs: Vec::new() })
 }

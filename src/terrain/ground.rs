@@ -12,6 +12,8 @@ pub struct Ground {
     pub field: Heightfield,
     /// (rows, columns) of the same grid before smoothing, holes filled, m; for heightmaps.
     pub raw: Option<Vec<f64>>,
+    /// (rows, columns) of the same grid: where nothing was measured; none if there is no such place.
+    pub unknown: Option<Vec<bool>>,
     /// What it is and how well it represents its source.
     pub report: GroundReport,
     /// Name as given in the scenario and SHA-256 (hexadecimal) of each file read.

@@ -80,6 +80,24 @@ pub fn closed(grid: &Grid, heights: &[f64], width: f64) -> Vec<f64> {
     extreme(extreme(heights.to_vec(), f64::max), f64::min)
 }
 
+/// The cells of a set that a disc within the set can cover (a morphological opening): without what is narrower than the disc.
+pub fn opened(grid: &Grid, set: &[bool], radius: f64) -> Vec<bool> {
+    let around = disc(grid, radius);
+    let mut middles = vec![false; set.len()];
+    for_each_neighborhood(grid, &around, |cell, mut neighbors| {
+        middles[cell] = neighbors.all(|(_, i)| set[i])
+    });
+    widened(grid, &middles, radius)
+}
+
+/// The cells within a distance of a set.
+pub fn widened(grid: &Grid, set: &[bool], radius: f64) -> Vec<bool> {
+    let around = disc(grid, radius);
+    let mut wide = vec![false; set.len()];
+    for_each_neighborhood(grid, &around, |cell, mut neighbors| wide[cell] = neighbors.any(|(_, i)| set[i]));
+    wide
+}
+
 /// The average under a Gaussian of this standard deviation, m; beyond the border the outermost cells are repeated.
 pub fn averaged(grid: &Grid, heights: &[f64], deviation: f64) -> Vec<f64> {
     let kernel = |spacing: f64| -> Vec<f64> {
@@ -139,6 +157,24 @@ mod tests {
         assert!(gap(0.15).iter().any(|h| *h < -0.3));
         let step = raster(|x, _| if x > 0.3 { 0.2 } else { 0.0 });
         assert_eq!(closed(&GRID, &step, 0.1), step);
+    }
+
+    #[test]
+    fn small_holes_are_left_out_and_wide_ones_keep_their_size() {
+        let hole = |width: f64| -> Vec<bool> {
+            raster(|x, y| if (x - 0.3).abs().max((y - 0.2).abs()) < 0.5 * width { 1.0 } else { 0.0 })
+                .iter()
+                .map(|h| *h > 0.0)
+                .collect()
+        };
+        let count = |set: &[bool]| set.iter().filter(|inside| **inside).count();
+        assert_eq!(count(&opened(&GRID, &hole(0.05), 0.03)), 0);
+        let wide = hole(0.15);
+        let opened = opened(&GRID, &wide, 0.03);
+        // Only its corners are rounded.
+        assert!(opened.iter().zip(&wide).all(|(o, w)| *w || !*o));
+        assert!(count(&opened) > count(&wide) - 4 * 9 && count(&opened) < count(&wide));
+        assert_eq!(count(&widened(&GRID, &hole(0.005), 0.01)), 5);
     }
 
     #[test]

@@ -16,6 +16,9 @@ const LARGEST_RELIEF: f64 = 1000.0;
 /// `terrain.extent` may exceed the file by this, m, because users round.
 const EXTENT_SLACK: f64 = 1e-4;
 
+/// A place this close to a cell, in cells, is on it.
+const ON_CELL: f64 = 1e-6;
+
 /// Heights at the nodes of a grid, row 0 at the least y; NaN for no data.
 pub struct Scan {
     /// Where the nodes are; the same spacing along x and y.
@@ -67,6 +70,12 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, sc
         .map_err(|e| Error::key("terrain.extent", e))?
     };
     let raw = field.grid().sample(|x, y| Ok(flat_between(&filled, x, y)))?;
+    let unknown: Vec<bool> = (0..field.grid().len())
+        .map(|i| {
+            let (x, y) = (field.grid().x(i % field.grid().columns), field.grid().y(i / field.grid().columns));
+            is_between(&grid, &holes, x, y)
+        })
+        .collect();
 
     let mut error = FitError::default();
     let (mut cells, mut holes_filled) = (0, 0);
@@ -84,7 +93,8 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, sc
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
     report.notes = notes(spec, footholds, &grid, cells, &report);
-    Ok(Ground { field, raw: Some(raw), report, inputs: Vec::new() })
+    let unknown = unknown.contains(&true).then_some(unknown);
+    Ok(Ground { field, raw: Some(raw), unknown, report, inputs: Vec::new() })
 }
 
 /// What a user should know about a scan, of whose grid `cells` lie within the extent.
@@ -98,11 +108,12 @@ fn notes(
     let mut notes = Vec::new();
     if spec.smoothing.is_none() && footholds == Footholds::Anywhere {
         notes.push(format!(
-            "smoothed over {:.3} m by default (the larger of {} cells and {} m; terrain.smoothing sets it); \
+            "smoothed over {:.3} m by default ({} cells, from {} to {} m; terrain.smoothing sets it); \
              heights moved by {:.4} m rms, {:.4} m at most",
             report.smoothing,
             HeightmapSpec::SMOOTHING_CELLS,
             HeightmapSpec::SMOOTHING_LENGTH,
+            HeightmapSpec::SMOOTHING_CEILING,
             report.fit_error_rms,
             report.fit_error_max
         ));
@@ -122,6 +133,17 @@ fn notes(
         ));
     }
     notes
+}
+
+/// Whether the height at a place is interpolated from a cell that is a hole.
+fn is_between(grid: &Grid, holes: &[bool], x: f64, y: f64) -> bool {
+    let cells = |at: f64, count: usize| {
+        let at = at.clamp(0.0, (count - 1) as f64);
+        (at + ON_CELL) as usize..=((at - ON_CELL).ceil() as usize).min(count - 1)
+    };
+    let columns = cells((x - grid.origin[0]) / grid.spacing[0], grid.columns);
+    let mut rows = cells((y - grid.origin[1]) / grid.spacing[1], grid.rows);
+    rows.any(|row| columns.clone().any(|column| holes[row * grid.columns + column]))
 }
 
 /// The rectangle to use, which must lie within that of the scan; by default it is the whole scan.

@@ -91,6 +91,7 @@ impl Surfaces {
         let foot = robot.foot_radius();
         let half_size = robot.feet.iter().flat_map(|f| f.reach.half_size[..2].to_vec()).fold(0.0, f64::max);
         let needs = FootNeeds {
+            hole: foot,
             even: EVEN * foot,
             roughness: ROUGHNESS * foot,
             beside: BESIDE * foot,
@@ -101,7 +102,8 @@ impl Surfaces {
         };
         let deviation = POSTURE * robot.standing_height();
         ensure_coarse(grid, deviation.max(needs.beside))?;
-        let contact = ContactGround::new(grid, heights, needs);
+        let unknown = ground.unknown.as_deref().filter(|_| contact.on_known_ground);
+        let contact = ContactGround::new(grid, heights, unknown, needs);
         // At the top of an edge, the average lies below what the body itself rolls over.
         let envelope = |radius: f64, least: f64| {
             let averaged = averaged(grid, &rolled_over(grid, raw, radius), ENVELOPE * foot);

@@ -4,6 +4,7 @@ pub mod files;
 pub mod inputs;
 
 use std::ops::ControlFlow;
+use std::path::Path;
 
 use warpgait::heightfield::Heightfield;
 use warpgait::pipeline::Prepared;
@@ -30,7 +31,12 @@ impl Host for Patient<'_> {
 
 /// Solves a scenario given as text, its map made anew, and samples the motion.
 pub fn solved(text: &str) -> (Motion, Plan) {
-    let loaded = load_text("scenario", text, ".".as_ref(), &[]).expect("a scenario");
+    solved_in(".".as_ref(), text)
+}
+
+/// The same with terrain files in a folder.
+pub fn solved_in(folder: &Path, text: &str) -> (Motion, Plan) {
+    let loaded = load_text("scenario", text, folder, &[]).expect("a scenario");
     let scenario = &loaded.scenario;
     let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
     let build = || warp::build(&prepared.surfaces.posture, &scenario.map, &mut |_| ControlFlow::Continue(()));
@@ -104,6 +110,7 @@ pub fn standing() -> Plan {
             spacing: [0.05, 0.05],
             height: vec![0.0; rows * columns],
             raw: None,
+            unknown: None,
         },
         patches: Vec::new(),
         map: None,
