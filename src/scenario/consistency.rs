@@ -27,7 +27,7 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     headings(document, scenario)?;
     terrain(document, scenario)?;
     if let Some(extent) = scenario.terrain.extent() {
-        inside(document, scenario, robot, extent)?;
+        inside(document, scenario, None, extent)?;
     }
     time_steps(document, scenario)?;
     law(document, scenario)?;
