@@ -102,6 +102,9 @@ impl Prepared {
         let scenario = &loaded.scenario;
         // Refused before the terrain is read.
         let usual = Gait::of(scenario, &loaded.robot).map_err(|e| loaded.locate(e))?;
+        if let Some(extent) = scenario.terrain.extent() {
+            loaded.ensure_inside(extent)?;
+        }
         // A request to stop takes effect at the first iteration.
         let _ = observer(&Event::Step(Step::Terrain));
         let ground = terrain::build(scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;

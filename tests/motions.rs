@@ -135,7 +135,7 @@ fn a_trot_on_flat_ground_is_symmetric() {
 #[test]
 fn what_cannot_be_done_is_reported_with_its_place() {
     let text = "formulation = \"direct\"\nhorizon = 3.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nspacing = 0.1\n\
-                [start]\nposition = [-2.0, 0.0]\n[goal]\nposition = [-0.5, 0.0]\n[solver]\nmax_iterations = 30\n";
+                [start]\nposition = [-2.0, 0.0]\n[goal]\nposition = [-0.8, 0.0]\nyaw = 3.0\n[solver]\nmax_iterations = 30\n";
     let (motion, plan, report) = run(text);
     assert!(!motion.solved && !plan.meta.solver.success);
     assert!(motion.max_violation() > 1e-3);
