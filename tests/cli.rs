@@ -279,7 +279,10 @@ fn solve_refuses_bad_input_before_computing() {
         &["degrees.toml"],
         &["degrees.toml:13: goal.yaw: given 90, allowed: -2π to 2π rad; 90° are 1.5708 rad"],
     );
-    solve(&["far.toml", "--quiet"], &["far.toml:12: goal.position: 5.00 m from the start; in 3 s", "set horizon to "]);
+    solve(
+        &["far.toml", "--quiet"],
+        &["far.toml:12: goal.position: 5.00 m from the start; in 3 s", "set horizon to "],
+    );
     solve(&["nan.toml"], &["nan.toml:1: horizon: given nan"]);
     solve(&["robot.toml"], &["anymal_x", "anymal_towr"]);
     solve(&["flat.toml", "-o", "no/such/a.plan.npz"], &["no/such/a.plan.npz", "cannot be written"]);
