@@ -32,11 +32,6 @@ impl DrawnGround<'_> {
         self.surfaces.contact.as_deref()
     }
 
-    /// Whether there is ground without data.
-    pub fn has_unknown(&self) -> bool {
-        self.grid.unknown.is_some()
-    }
-
     /// The ground within a frame: bands of height, what has no data, and, hatched, what cannot be stood on.
     pub fn draw(&self, svg: &mut Svg, axes: &Axes) {
         let shades = Shades::over(axes, self.grid);
@@ -48,12 +43,7 @@ impl DrawnGround<'_> {
                     &band_style(band),
                 );
             }
-            if let Some(unknown) = &self.grid.unknown {
-                let without_data: Vec<bool> = places(axes)
-                    .map(|place| nearest(self.grid, place).is_some_and(|cell| unknown[cell]))
-                    .collect();
-                svg.rects(runs(axes.frame, 0.0, |cell| without_data[cell]), UNKNOWN);
-            }
+            draw_unknown(svg, axes, self.grid);
             if let Some(contact) = self.contact() {
                 let steppable: Vec<bool> = places(axes).map(|[x, y]| contact.is_steppable([x, y])).collect();
                 svg.hatching("hatching");
@@ -77,12 +67,6 @@ impl DrawnGround<'_> {
             let inside = self.surfaces.have_edges() && height(self.grid, x, y).is_some();
             inside.then(|| self.surfaces.feet.height(x, y))
         })
-    }
-
-    /// A sample of ground without data, for a legend.
-    pub fn unknown_sample(svg: &mut Svg, frame: [f64; 4]) {
-        svg.rect(frame, "fill=\"#f3eede\"");
-        svg.rect(frame, &format!("{UNKNOWN} stroke=\"#888\" stroke-width=\"0.6\""));
     }
 
     /// A sample of what is hatched, for a legend.
@@ -117,6 +101,21 @@ pub(super) fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
     let low = h(i, j) * (1.0 - a) + h(i + 1, j) * a;
     let high = h(i, j + 1) * (1.0 - a) + h(i + 1, j + 1) * a;
     Some(low * (1.0 - b) + high * b)
+}
+
+/// Ground without data within a frame.
+pub(super) fn draw_unknown(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
+    if let Some(unknown) = &ground.unknown {
+        let is_unknown = |place| nearest(ground, place).is_some_and(|cell| unknown[cell]);
+        let cells: Vec<bool> = places(axes).map(is_unknown).collect();
+        svg.rects(runs(axes.frame, 0.0, |cell| cells[cell]), UNKNOWN);
+    }
+}
+
+/// A sample of ground without data, for a legend.
+pub(super) fn unknown_sample(svg: &mut Svg, frame: [f64; 4]) {
+    svg.rect(frame, "fill=\"#f3eede\"");
+    svg.rect(frame, &format!("{UNKNOWN} stroke=\"#888\" stroke-width=\"0.6\""));
 }
 
 /// The sample nearest to a place; none outside the grid.

@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, range};
 use super::color::foot_color;
-use super::ground::DrawnGround;
+use super::ground::{DrawnGround, unknown_sample};
 use super::svg::{Font, Svg};
 use super::table::{check_counts, number};
 use crate::plan::Plan;
@@ -92,9 +92,9 @@ fn legend(svg: &mut Svg, plan: &Plan, ground: &DrawnGround) {
         name(svg, x, "no foot can stand here");
         x += 60.0;
     }
-    if ground.has_unknown() {
+    if plan.ground.unknown.is_some() {
         x += 110.0;
-        DrawnGround::unknown_sample(svg, box_at(x));
+        unknown_sample(svg, box_at(x));
         name(svg, x, "no data");
     }
 }

@@ -1,13 +1,12 @@
 //! A picture of a ground: from above with its axes, north, start and goal, and along the way.
 
 use super::axes::{Axes, range};
-use super::ground::{BANDS, OVERLAP, PROFILE, Shades, band_style, height, places, runs};
+use super::ground::{
+    BANDS, OVERLAP, PROFILE, Shades, band_style, draw_unknown, height, runs, unknown_sample,
+};
 use super::svg::{Font, Svg};
-use crate::heightfield::Grid;
 use crate::plan::GroundGrid;
 
-/// Style of cells without data.
-const UNKNOWN: &str = "fill=\"url(#unknown)\"";
 /// Style of the way.
 const WAY: &str = "stroke=\"#111\" stroke-width=\"1.6\" stroke-dasharray=\"7 4\"";
 /// Length of the arrows along x and y, pixels.
@@ -19,8 +18,6 @@ pub struct TerrainView<'a> {
     pub title: &'a str,
     /// The ground, holes filled.
     pub ground: &'a GroundGrid,
-    /// Where heights were measured, and which of them are unknown; none if all are known.
-    pub unknown: Option<(&'a Grid, &'a [f64])>,
     /// Positions of start and goal, m.
     pub ends: Option<[[f64; 2]; 2]>,
     /// Lines of text beside the drawing.
@@ -30,7 +27,6 @@ pub struct TerrainView<'a> {
 /// An SVG drawing of a ground.
 pub fn terrain_sheet(view: &TerrainView) -> String {
     let mut svg = Svg::new(1180.0, 680.0);
-    svg.hatching("unknown");
     svg.text([70.0, 32.0], view.title, Font { size: 19.0, ..Font::TITLE });
     from_above(&mut svg, view, [70.0, 76.0, 560.0, 540.0]);
     facts(&mut svg, view, [730.0, 90.0]);
@@ -54,10 +50,7 @@ fn from_above(svg: &mut Svg, view: &TerrainView, frame: [f64; 4]) {
         for band in 0..BANDS {
             svg.rects(runs(frame, OVERLAP, |cell| shades.band(cell) == Some(band)), &band_style(band));
         }
-        if let Some((grid, heights)) = view.unknown {
-            let unknown: Vec<bool> = places(&axes).map(|place| is_unknown(grid, heights, place)).collect();
-            svg.rects(runs(frame, 0.0, |cell| unknown[cell]), UNKNOWN);
-        }
+        draw_unknown(svg, &axes, ground);
     });
     shades.scale(svg, frame);
     axes.draw(svg, "From above, shaded by height", "x, m (forward)", "y, m (left)");
@@ -87,16 +80,6 @@ fn arrow(svg: &mut Svg, [x, y]: [f64; 2], [dx, dy]: [f64; 2], name: &str) {
     svg.label(place, name, font);
 }
 
-/// Whether the cell nearest to a place has no data.
-fn is_unknown(grid: &Grid, heights: &[f64], [x, y]: [f64; 2]) -> bool {
-    let cell = |at: f64, axis: usize, count: usize| {
-        let i = ((at - grid.origin[axis]) / grid.spacing[axis]).round();
-        (0.0..count as f64).contains(&i).then_some(i as usize)
-    };
-    let (column, row) = (cell(x, 0, grid.columns), cell(y, 1, grid.rows));
-    column.zip(row).is_some_and(|(column, row)| heights[row * grid.columns + column].is_nan())
-}
-
 fn facts(svg: &mut Svg, view: &TerrainView, [x, mut y]: [f64; 2]) {
     for line in view.facts {
         for part in wrapped(line) {
@@ -104,9 +87,8 @@ fn facts(svg: &mut Svg, view: &TerrainView, [x, mut y]: [f64; 2]) {
             y += 19.0;
         }
     }
-    if view.unknown.is_some() {
-        svg.rect([x, y - 11.0, 20.0, 13.0], "fill=\"#f3eede\"");
-        svg.rect([x, y - 11.0, 20.0, 13.0], &format!("{UNKNOWN} stroke=\"#888\" stroke-width=\"0.6\""));
+    if view.ground.unknown.is_some() {
+        unknown_sample(svg, [x, y - 11.0, 20.0, 13.0]);
         svg.text([x + 28.0, y], "no data: filled from its surroundings", Font::LABEL.anchored("start"));
     }
 }

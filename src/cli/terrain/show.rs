@@ -59,11 +59,6 @@ pub(super) fn show(arguments: &ShowArguments, console: &Console) -> Result<Endin
         let view = TerrainView {
             title: &title,
             ground: &grid(&read),
-            unknown: read
-                .heightmap
-                .as_ref()
-                .filter(|h| h.source.unknown > 0)
-                .map(|h| (&h.scan.grid, &h.scan.heights[..])),
             ends: ends.map(|ends| ends.map(|(position, _)| position)),
             facts: &facts,
         };
@@ -97,6 +92,7 @@ fn grid(read: &Read) -> GroundGrid {
         spacing: grid.spacing,
         height: read.ground.raw.clone().unwrap_or_else(|| read.ground.field.samples().to_vec()),
         raw: None,
+        unknown: read.ground.unknown.clone(),
     }
 }
 
