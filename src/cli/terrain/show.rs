@@ -49,10 +49,13 @@ pub(super) fn show(arguments: &ShowArguments, console: &Console) -> Result<Endin
         }
     };
     let read = arguments.source.read(plot.as_deref())?;
+    let (facts, mut notes) = (facts(&read), read.ground.report.notes.clone());
     if read.has_ends {
-        read.loaded.ensure_inside(read.ground.field.extent())?;
+        let extent = read.ground.field.extent();
+        read.loaded.ensure_base_inside(extent)?;
+        // A solve would refuse this; a drawing shows it.
+        notes.extend(read.loaded.ensure_inside(extent).err().map(|error| error.to_string()));
     }
-    let (facts, notes) = (facts(&read), &read.ground.report.notes);
     if let Some(plot) = &plot {
         let title = input.file_name().unwrap_or_default().to_string_lossy();
         let ends = ends(&read);
