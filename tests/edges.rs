@@ -105,7 +105,7 @@ fn ground_that_cannot_be_walked_is_refused_with_the_place() {
     let needles = "0.5*(sin(40*x)*sin(40*y))";
     let fence = "0.3*(sign(x - 0.61) - sign(x - 0.69))";
     for (expression, words) in [
-        (wall, vec!["foot ", "would have to step from x = ", "0.60 m in height"]),
+        (wall, vec!["foot ", "would have to step from x = ", "0.60 m up"]),
         (fence, vec!["foot ", "would have to step from x = ", "over 0.60 m of ground"]),
         (gap, vec!["foot ", "x = ", "y = "]),
         (needles, vec!["there is no place where a foot can stand"]),

@@ -52,8 +52,8 @@ pub struct Leg {
     pub tube_radius: Option<f64>,
     /// +1 if the shank points further forward than the thigh, −1 if it points further back.
     pub bend: f64,
-    /// Of the foot.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Of the foot, m.
+    #[schemars(range(min = 0.001, max = 1.0))]
     pub foot_radius: f64,
     /// Greatest speed of each joint, rad/s.
     #[schemars(range(min = 0.01, max = 1000.0))]

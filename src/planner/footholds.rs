@@ -53,7 +53,11 @@ fn ensure_walkable(
             let what = if over > highest + hopeless {
                 format!("over {over:.2} m of ground; it can take about {highest:.2} m")
             } else if height.abs() > highest + hopeless {
-                format!("{height:.2} m in height; it can take about {highest:.2} m")
+                format!(
+                    "{:.2} m {}; it can take about {highest:.2} m",
+                    height.abs(),
+                    if height > 0.0 { "up" } else { "down" }
+                )
             } else if length > longest + hopeless {
                 format!("{length:.2} m; it can take about {longest:.2} m")
             } else {
