@@ -4,13 +4,15 @@
 //!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) ≤ center + half_size
 //! ```
 //!
-//! Rows: x, y, z in the base frame for each foot and sample, m.
+//! Rows: x, y, z in the base frame for each foot and sample, m; over ground with edges also halfway between samples in which a known
+//! leg swings, because a foot that is lifted over an obstacle leaves the straight line between them by more than the margin.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::sink::Sink;
 use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
+use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
 use nalgebra::Vector3;
 
@@ -19,11 +21,12 @@ use super::margins;
 /// Feet within reach at every sample.
 #[derive(Clone, Debug)]
 pub struct Reach {
-    places: Vec<(usize, usize)>,
+    places: Vec<(usize, Instant)>,
 }
 
-/// Taken off the box on each side for foot `i` at sample `k`, m.
-fn margin(model: &Model, i: usize, k: usize) -> f64 {
+/// Taken off the box on each side for foot `i` at an instant, m.
+fn margin(model: &Model, i: usize, at: Instant) -> f64 {
+    let Instant::Sample(k) = at else { return margins::REACH_SWINGING };
     let phase = &model.layout.phase[i];
     let swings = |k: usize| matches!(phase.get(k), Some(Phase::Swing(_)));
     if swings(k) {
@@ -36,10 +39,18 @@ fn margin(model: &Model, i: usize, k: usize) -> f64 {
 }
 
 impl Reach {
-    /// Every foot at every sample.
+    /// Every foot at every sample, and in between where it may hurry.
     pub fn new(model: &Model) -> Self {
         let samples = model.layout.intervals + 1;
-        let places = (0..model.feet()).flat_map(|i| (0..samples).map(move |k| (i, k))).collect();
+        let mut places = Vec::new();
+        for i in 0..model.feet() {
+            places.extend((0..samples).map(|k| (i, Instant::Sample(k))));
+            if model.surfaces.have_edges() && model.legs[i].is_some() {
+                let between = (0..model.layout.intervals).map(Instant::Between);
+                let swings = |at: &Instant| matches!(model.layout.phase_at(i, *at), Phase::Swing(_));
+                places.extend(between.filter(swings).map(|at| (i, at)));
+            }
+        }
         Self { places }
     }
 }
@@ -54,9 +65,9 @@ impl Constraint for Reach {
     }
 
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        for (r, &(i, k)) in self.places.iter().enumerate() {
+        for (r, &(i, at)) in self.places.iter().enumerate() {
             let reach = &model.reach[i];
-            let margin = margin(model, i, k);
+            let margin = margin(model, i, at);
             for c in 0..3 {
                 lower[3 * r + c] = reach.center[c] - reach.half_size[c] + margin;
                 upper[3 * r + c] = reach.center[c] + reach.half_size[c] - margin;
@@ -94,7 +105,7 @@ impl Constraint for Reach {
     }
 
     fn place(&self, row: usize) -> RowPlace {
-        let (i, k) = self.places[row / 3];
-        RowPlace { foot: Some(i), sample: k as f64 }
+        let (i, at) = self.places[row / 3];
+        RowPlace { foot: Some(i), sample: at.time() }
     }
 }

@@ -198,7 +198,9 @@ impl MapReport {
             MapMethod::Dirichlet | MapMethod::Arap | MapMethod::AcapLocalGlobal => {
                 "the energy of this method does not prevent folding on steep ground; use map.method = \"mips\" or \"acap-newton\", which do, or formulation = \"direct\", which needs no map"
             }
-            _ => "use formulation = \"direct\", which needs no map, more cells (map.cells), or smoother terrain",
+            _ => {
+                "use formulation = \"direct\", which needs no map, more cells (map.cells), or smoother terrain"
+            }
         };
         let count = self.inverted_points;
         format!("it folds at {count} points, worst near x̄ {x:.2}, ȳ {y:.2}, z̄ {z:.2} m; {remedy}")
