@@ -10,7 +10,7 @@ use super::linear_solver::LinearSolver;
 use super::lock::SolverLock;
 use super::option_value::OptionValue;
 use super::options::Options;
-use super::plug::{Outcome, Plugged};
+use super::plug::{Analysis, Outcome, Plugged};
 use super::problem::NlpProblem;
 use super::solution::{Multipliers, Status};
 
@@ -22,6 +22,8 @@ const DEFAULT_MAX_ITER: i32 = 3000;
 pub(super) struct Attempt<'a> {
     pub options: &'a Options,
     pub layout: &'a ProblemLayout,
+    /// Of the matrices that faer factors.
+    pub analysis: Analysis,
     pub lock: &'a SolverLock,
 }
 
@@ -51,10 +53,10 @@ impl Attempt<'_> {
         x: Vec<f64>,
         linear_solver: LinearSolver,
     ) -> Result<Ended, IpoptError> {
-        let Self { options, layout, lock } = self;
+        let Self { options, layout, analysis, lock } = self;
         let mut application = Application::new(layout, callbacks::<P>(), lock)?;
         let plugged = match linear_solver {
-            LinearSolver::Faer => Some(Plugged::new(layout, lock).ok_or(IpoptError::NoFaer)?),
+            LinearSolver::Faer => Some(Plugged::new(layout, analysis, lock).ok_or(IpoptError::NoFaer)?),
             _ => None,
         };
         options.apply(&mut application, linear_solver, layout.hessian.is_some())?;

@@ -12,6 +12,7 @@ use super::layout::ProblemLayout;
 use super::linear_solver::LinearSolver;
 use super::lock::SolverLock;
 use super::options::Options;
+use super::plug::by_kkt;
 use super::problem::NlpProblem;
 use super::solution::IterationRecord;
 
@@ -47,7 +48,7 @@ fn probe(problem: &mut impl NlpProblem, linear_solver: LinearSolver, lock: &Solv
         let x = layout.initial_point(problem)?;
         let mut on_iteration = |_: &IterationRecord, _: &[f64]| ControlFlow::Continue(());
         let mut session = Session::new(problem, &mut on_iteration, &layout, &x);
-        let attempt = Attempt { options: &Options::new(), layout: &layout, lock };
+        let attempt = Attempt { options: &Options::new(), layout: &layout, analysis: by_kkt, lock };
         let ended = attempt.run(&mut session, x, linear_solver)?;
         let used = ended.plug.is_some_and(|outcome| outcome.used);
         Ok::<bool, IpoptError>(ended.code == ffi::Solve_Succeeded && used)

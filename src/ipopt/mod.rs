@@ -23,6 +23,8 @@ mod attempt;
 mod availability;
 mod callbacks;
 mod error;
+#[cfg(test)]
+mod faults;
 mod interrupt;
 mod layout;
 mod linear_solver;

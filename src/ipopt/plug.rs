@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::slice;
 
 use ipopt_sys::ma57;
-use kkt::{Factored, Kkt};
+use kkt::{Factored, Kkt, Layout};
 
 use super::layout::ProblemLayout;
 use super::lock::SolverLock;
@@ -35,12 +35,40 @@ mod info {
 /// own test demands 1e-10 and accepts what is below 1e-5.)
 const LARGEST_RESIDUAL: f64 = 1e-8;
 
+/// A matrix with a fixed pattern, as the plug uses it.
+pub trait Matrix {
+    /// Factors it with these values, in the order of its entries.
+    fn factor(&mut self, values: &[f64]) -> Factored;
+    /// Replaces a right-hand side by the solution with the last factors, and returns the relative residual.
+    fn solve(&mut self, x: &mut [f64]) -> f64;
+}
+
+impl Matrix for Kkt {
+    fn factor(&mut self, values: &[f64]) -> Factored {
+        self.factor(values)
+    }
+
+    fn solve(&mut self, x: &mut [f64]) -> f64 {
+        self.solve(x)
+    }
+}
+
+/// Makes a matrix from its blocks and the rows and columns of its entries, from 0; `None` if it cannot.
+pub type Analysis = fn(Layout, &[u32], &[u32]) -> Option<Box<dyn Matrix>>;
+
+/// The analysis of the crate `kkt`.
+pub fn by_kkt(layout: Layout, rows: &[u32], columns: &[u32]) -> Option<Box<dyn Matrix>> {
+    Some(Box::new(Kkt::new(layout, rows, columns).ok()?))
+}
+
 /// The state of the five functions.
-#[derive(Default)]
 struct State {
-    layouts: Vec<kkt::Layout>,
+    layouts: Vec<Layout>,
+    analysis: Analysis,
     /// One for each analysis. Ipopt refers to them by their position plus one.
-    matrices: Vec<Kkt>,
+    matrices: Vec<Box<dyn Matrix>>,
+    /// See [`Outcome::singular`].
+    singular: usize,
     failed: bool,
     panic: Option<Box<dyn Any + Send>>,
 }
@@ -68,9 +96,16 @@ pub struct Outcome {
 
 impl<'lock> Plugged<'lock> {
     /// Plugs the linear solver in for problems of this layout; `None` if the library cannot use it.
-    pub fn new(layout: &ProblemLayout, lock: &'lock SolverLock) -> Option<Self> {
+    pub fn new(layout: &ProblemLayout, analysis: Analysis, lock: &'lock SolverLock) -> Option<Self> {
         let set_functions = ma57::set_functions()?;
-        STATE.set(Some(State { layouts: layouts(layout), ..State::default() }));
+        STATE.set(Some(State {
+            layouts: layouts(layout),
+            analysis,
+            matrices: Vec::new(),
+            singular: 0,
+            failed: false,
+            panic: None,
+        }));
         // SAFETY: the five functions have the signatures that Ipopt's interface to MA57 calls and live as long as the process.
         unsafe { set_functions(analyze, factorize, solve, enlarge, initialize) };
         Some(Self { _lock: lock })
@@ -80,7 +115,7 @@ impl<'lock> Plugged<'lock> {
     pub fn outcome(&self) -> Outcome {
         with_state(|state| Outcome {
             failed: state.failed,
-            singular: state.matrices.iter().map(|kkt| kkt.statistics.singular).sum(),
+            singular: state.singular,
             used: !state.matrices.is_empty(),
             panic: state.panic.take(),
         })
@@ -106,15 +141,15 @@ fn with_state<R>(use_it: impl FnOnce(&mut State) -> R) -> Option<R> {
 /// The blocks of the matrix under each of Ipopt's three treatments of fixed variables: taken out (`make_parameter`, the default), left in
 /// with relaxed bounds (`relax_bounds`, what the first becomes when there are more equations than free variables), and left in with an
 /// equation each (`make_constraint`). The order of the matrix determines which one is in effect.
-fn layouts(layout: &ProblemLayout) -> Vec<kkt::Layout> {
+fn layouts(layout: &ProblemLayout) -> Vec<Layout> {
     let equal = |lower: &[f64], upper: &[f64]| lower.iter().zip(upper).filter(|(a, b)| a == b).count();
     let fixed = equal(&layout.variable_lower, &layout.variable_upper);
     let equations = equal(&layout.constraint_lower, &layout.constraint_upper);
     let (variables, inequalities) = (layout.num_variables, layout.num_constraints - equations);
     vec![
-        kkt::Layout { variables: variables - fixed, inequalities, equations },
-        kkt::Layout { variables, inequalities, equations },
-        kkt::Layout { variables, inequalities, equations: equations + fixed },
+        Layout { variables: variables - fixed, inequalities, equations },
+        Layout { variables, inequalities, equations },
+        Layout { variables, inequalities, equations: equations + fixed },
     ]
 }
 
@@ -177,13 +212,13 @@ unsafe extern "C" fn analyze(
         let from_zero = |indices: &[c_int]| -> Vec<u32> {
             indices.iter().map(|&index| (index as u32).wrapping_sub(1)).collect()
         };
-        match Kkt::new(layout, &from_zero(rows), &from_zero(columns)) {
-            Ok(kkt) => {
-                state.matrices.push(kkt);
+        match (state.analysis)(layout, &from_zero(rows), &from_zero(columns)) {
+            Some(matrix) => {
+                state.matrices.push(matrix);
                 *keep = state.matrices.len() as c_int;
                 info::DONE
             }
-            Err(_) => info::FAILED,
+            None => info::FAILED,
         }
     });
     for place in info::LENGTHS {
@@ -192,7 +227,7 @@ unsafe extern "C" fn analyze(
 }
 
 unsafe extern "C" fn factorize(
-    _n: *mut c_int,
+    n: *mut c_int,
     num_entries: *mut c_int,
     values: *mut f64,
     _fact: *mut f64,
@@ -208,23 +243,23 @@ unsafe extern "C" fn factorize(
     _rinfo: *mut f64,
 ) {
     // SAFETY: see above; `values` has `num_entries` numbers.
-    let (values, ifact, keep, info) = unsafe {
+    let (n, values, ifact, keep, info) = unsafe {
         let values = slice::from_raw_parts(values.cast_const(), *num_entries as usize);
-        (values, &mut *ifact, *keep, slice::from_raw_parts_mut(info, 40))
+        (*n, values, &mut *ifact, *keep, slice::from_raw_parts_mut(info, 40))
     };
     *ifact = keep;
     info[info::STATUS] = guarded(|state| {
-        let Some(kkt) = matrix(state, keep) else {
+        let Some(matrix) = matrix(state, keep) else {
             return info::FAILED;
         };
-        let n = kkt.dimension() as c_int;
-        match kkt.factor(values) {
+        match matrix.factor(values) {
             Factored::Regular { negative } => {
                 info[info::NEGATIVE] = negative as c_int;
                 info[info::RANK] = n;
                 info::DONE
             }
             Factored::Singular => {
+                state.singular += 1;
                 info[info::RANK] = n - 1;
                 info::SINGULAR
             }
@@ -255,11 +290,11 @@ unsafe extern "C" fn solve(
         (n, right_sides, *ifact, slice::from_raw_parts_mut(info, 40))
     };
     info[info::STATUS] = guarded(|state| {
-        let Some(kkt) = matrix(state, keep) else {
+        let Some(matrix) = matrix(state, keep) else {
             return info::FAILED;
         };
         for right_side in right_sides.chunks_exact_mut(n) {
-            let residual = kkt.solve(right_side);
+            let residual = matrix.solve(right_side);
             if residual > LARGEST_RESIDUAL || residual.is_nan() {
                 return info::FAILED;
             }
@@ -286,6 +321,6 @@ unsafe extern "C" fn enlarge(
 }
 
 /// The matrix of an analysis, by its position counted from one.
-fn matrix(state: &mut State, keep: c_int) -> Option<&mut Kkt> {
-    state.matrices.get_mut(usize::try_from(keep).ok()?.checked_sub(1)?)
+fn matrix(state: &mut State, keep: c_int) -> Option<&mut dyn Matrix> {
+    Some(&mut **state.matrices.get_mut(usize::try_from(keep).ok()?.checked_sub(1)?)?)
 }

@@ -12,6 +12,7 @@ use super::layout::ProblemLayout;
 use super::linear_solver::LinearSolver;
 use super::lock::SolverLock;
 use super::options::Options;
+use super::plug::{Analysis, by_kkt};
 use super::problem::{NlpProblem, OnIteration};
 use super::solution::{Solution, Status};
 
@@ -29,6 +30,16 @@ pub fn solve<P: NlpProblem>(
     options: &Options,
     on_iteration: &mut OnIteration<'_>,
 ) -> Result<Solution, IpoptError> {
+    solve_by(by_kkt, problem, options, on_iteration)
+}
+
+/// [`solve`], with what faer factors made by `analysis`.
+pub(super) fn solve_by<P: NlpProblem>(
+    analysis: Analysis,
+    problem: &mut P,
+    options: &Options,
+    on_iteration: &mut OnIteration<'_>,
+) -> Result<Solution, IpoptError> {
     let layout = ProblemLayout::of(problem)?;
     let x = layout.initial_point(problem)?;
     let lock = SolverLock::acquire()?;
@@ -37,7 +48,7 @@ pub fn solve<P: NlpProblem>(
 
     let start = Instant::now();
     let mut session = Session::new(problem, on_iteration, &layout, &x);
-    let attempt = Attempt { options, layout: &layout, lock: &lock };
+    let attempt = Attempt { options, layout: &layout, analysis, lock: &lock };
     let mut ended = attempt.run(&mut session, x, linear_solver)?;
     if session.stop.is_none() && ended.linear_solver_failed() {
         linear_solver = LinearSolver::Mumps;
