@@ -1,10 +1,9 @@
 //! The ground of the plan against that of the scenario, where the scenario describes it without a file, and against the heights
 //! that were measured.
 
-use std::path::Path;
-
 use super::laws;
 use super::subject::{Finding, Subject, Worst, larger};
+use crate::heightfield::Heightfield;
 use crate::scenario::{Footholds, TerrainSpec};
 use crate::{Error, Result, terrain};
 
@@ -30,15 +29,18 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
                 findings.push((laws::SMOOTHING, Worst::overall(1e3 * beyond_raw(s, raw, reach))));
             }
         }
-        _ => findings.push((laws::TERRAIN, Worst::overall(1e3 * off_function(s)?))),
+        spec => {
+            let refuse = |e: Error| Error::input(format!("meta.scenario: {e}"));
+            if let Some(field) = terrain::function_field(spec).map_err(refuse)? {
+                findings.push((laws::TERRAIN, Worst::overall(1e3 * off_function(s, &field))));
+            }
+        }
     }
     Ok(())
 }
 
 /// Largest difference of the plan's heights and extent from those of the scenario's terrain, m.
-fn off_function(s: &Subject) -> Result<f64> {
-    let refuse = |e: Error| Error::input(format!("meta.scenario: {e}"));
-    let field = terrain::build(s.scenario, Path::new(".")).map_err(refuse)?.field;
+fn off_function(s: &Subject, field: &Heightfield) -> f64 {
     let (plan, grid) = (&s.plan.ground, field.grid());
     let extent = s.ground.extent().iter().zip(field.extent()).fold(0.0, |m, (a, b)| larger(m, (a - b).abs()));
     let same_grid = (plan.rows, plan.columns) == (grid.rows, grid.columns);
@@ -54,7 +56,7 @@ fn off_function(s: &Subject) -> Result<f64> {
         };
         (h - expected).abs()
     });
-    Ok(heights.fold(extent, larger))
+    heights.fold(extent, larger)
 }
 
 /// By how much the smoothed heights leave the range of the raw ones around, up to `length` away, m.

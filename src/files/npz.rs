@@ -16,6 +16,8 @@ use crate::{Error, Result};
 const MAX_UNPACKED: usize = 512 << 20;
 /// The longest string of an array may take this many bytes, 4 for each character.
 const MAX_STRING: usize = 16 << 20;
+/// The fastest that deflates. zlib's default of 6 takes more than twice the time, for files that are 3 % smaller.
+const DEFLATE_LEVEL: i64 = 1;
 /// Bytes that are unpacked at a time.
 const BLOCK: usize = 1 << 16;
 
@@ -92,7 +94,9 @@ impl NpzWriter {
         let header = Header { dtype: dtype.into(), fortran_order: false, shape };
         let header = header.write().map_err(|e| Error::Internal(format!("{name}: {e}")))?;
         let at = |e: ZipError| failed(&self.target, &io_error(e));
-        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(DEFLATE_LEVEL));
         self.zip.start_file(format!("{name}.npy"), options).map_err(at)?;
         self.zip.write_all(&header).and_then(|()| self.zip.write_all(&bytes)).map_err(|e| at(e.into()))
     }

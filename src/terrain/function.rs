@@ -13,10 +13,8 @@ const NOTABLE_ERROR: f64 = 0.002;
 /// # Errors
 /// [`Error::Key`] for a domain with too many nodes and for heights that a spline cannot have; and those of h.
 pub fn ground(kind: &'static str, domain: &Domain, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Ground> {
-    let grid = Grid::fitted(domain.extent, domain.spacing).map_err(|e| Error::key("terrain.spacing", e))?;
-    let samples = grid.sample(&h)?;
-    let field = Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &samples)
-        .map_err(|e| Error::key("terrain", e))?;
+    let field = field(domain, &h)?;
+    let grid = field.grid();
     let mut error = FitError::default();
     for row in 0..grid.rows - 1 {
         for column in 0..grid.columns - 1 {
@@ -33,4 +31,15 @@ pub fn ground(kind: &'static str, domain: &Domain, h: impl Fn(f64, f64) -> Resul
         ));
     }
     Ok(Ground { field, raw: None, unknown: None, report, inputs: Vec::new() })
+}
+
+/// Samples h over its domain.
+///
+/// # Errors
+/// Those of [`ground`].
+pub fn field(domain: &Domain, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Heightfield> {
+    let grid = Grid::fitted(domain.extent, domain.spacing).map_err(|e| Error::key("terrain.spacing", e))?;
+    let samples = grid.sample(&h)?;
+    Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &samples)
+        .map_err(|e| Error::key("terrain", e))
 }

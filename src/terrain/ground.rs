@@ -77,11 +77,12 @@ impl GroundReport {
     pub(super) fn of(kind: &'static str, field: &Heightfield, error: &FitError) -> Self {
         let grid = field.grid();
         let (low, high) = range(field.samples());
-        let (mut largest_slope, mut steepest_at) = (0.0, [grid.x(0), grid.y(0)]);
+        let (mut largest_square, mut steepest_at) = (0.0, [grid.x(0), grid.y(0)]);
         let mut look = |x: f64, y: f64| {
             let [hx, hy] = field.gradient(x, y);
-            if hx.hypot(hy) > largest_slope {
-                largest_slope = hx.hypot(hy);
+            let square = hx * hx + hy * hy;
+            if square > largest_square {
+                largest_square = square;
                 steepest_at = [x, y];
             }
         };
@@ -100,7 +101,7 @@ impl GroundReport {
             spacing: grid.spacing,
             extent: field.extent(),
             height_range: [low, high],
-            largest_slope,
+            largest_slope: largest_square.sqrt(),
             steepest_at,
             fit_error_rms: (error.squares / error.count.max(1) as f64).sqrt(),
             fit_error_max: error.max,

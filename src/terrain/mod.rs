@@ -1,7 +1,7 @@
 //! From `[terrain]` of a scenario to the ground: the paper's shapes, formulas, heightmaps.
 //!
 //! Every kind ends as a [`Ground`]: a heightfield, and a report on how well it represents its source. To add a kind that is a
-//! function of x and y, add a variant to `scenario/terrain.rs` and a line to [`build`]. To add a file format, add a reader
+//! function of x and y, add a variant to `scenario/terrain.rs` and a line to `Shape::of`. To add a file format, add a reader
 //! and an entry to `FORMATS` in `formats/mod.rs`.
 
 mod analytic;
@@ -25,6 +25,8 @@ mod suspect;
 use std::path::Path;
 
 use crate::error::Result;
+use crate::heightfield::Heightfield;
+use crate::scenario::terrain::{Domain, HeightmapSpec};
 use crate::scenario::{Scenario, TerrainSpec};
 pub use contact::{ContactGround, FootNeeds};
 use formula::Formula;
@@ -42,25 +44,50 @@ pub use surfaces::Surfaces;
 /// finite. Says what, where, and what is allowed.
 pub fn build(scenario: &Scenario, base_dir: &Path) -> Result<Ground> {
     let kind = scenario.terrain.kind();
-    match &scenario.terrain {
-        TerrainSpec::Flat(flat) => function::ground(kind, &flat.domain, |_, _| Ok(0.0)),
-        TerrainSpec::Rippled(rippled) => {
-            function::ground(kind, &rippled.domain, total(analytic::rippled(rippled)))
-        }
-        TerrainSpec::Conic(conic) => function::ground(kind, &conic.domain, total(analytic::conic(conic))),
-        TerrainSpec::Hilly(hilly) => function::ground(kind, &hilly.domain, total(analytic::hilly(hilly))),
-        TerrainSpec::Pit(pit) => function::ground(kind, &pit.domain, total(analytic::pit(pit))),
-        TerrainSpec::Formula(spec) => {
-            let formula = Formula::parse(&spec.expression)?;
-            function::ground(kind, &spec.domain, |x, y| formula.height(x, y))
-        }
-        TerrainSpec::Heightmap(heightmap) => {
-            heightmap::ground(kind, heightmap, scenario.footholds(), base_dir)
-        }
+    match Shape::of(&scenario.terrain)? {
+        Shape::Function(domain, h) => function::ground(kind, domain, h),
+        Shape::Heightmap(spec) => heightmap::ground(kind, spec, scenario.footholds(), base_dir),
+    }
+}
+
+/// The heights that [`build`] finds for a terrain that is a function, without the report; none for a heightmap.
+///
+/// # Errors
+/// Those of [`build`].
+pub fn function_field(spec: &TerrainSpec) -> Result<Option<Heightfield>> {
+    match Shape::of(spec)? {
+        Shape::Function(domain, h) => function::field(domain, h).map(Some),
+        Shape::Heightmap(_) => Ok(None),
+    }
+}
+
+/// h(x, y), m.
+type Function = Box<dyn Fn(f64, f64) -> Result<f64>>;
+
+/// What a terrain is made from.
+enum Shape<'a> {
+    Function(&'a Domain, Function),
+    Heightmap(&'a HeightmapSpec),
+}
+
+impl<'a> Shape<'a> {
+    fn of(spec: &'a TerrainSpec) -> Result<Self> {
+        Ok(match spec {
+            TerrainSpec::Flat(flat) => Self::Function(&flat.domain, total(|_, _| 0.0)),
+            TerrainSpec::Rippled(spec) => Self::Function(&spec.domain, total(analytic::rippled(spec))),
+            TerrainSpec::Conic(spec) => Self::Function(&spec.domain, total(analytic::conic(spec))),
+            TerrainSpec::Hilly(spec) => Self::Function(&spec.domain, total(analytic::hilly(spec))),
+            TerrainSpec::Pit(spec) => Self::Function(&spec.domain, total(analytic::pit(spec))),
+            TerrainSpec::Formula(spec) => {
+                let formula = Formula::parse(&spec.expression)?;
+                Self::Function(&spec.domain, Box::new(move |x, y| formula.height(x, y)))
+            }
+            TerrainSpec::Heightmap(spec) => Self::Heightmap(spec),
+        })
     }
 }
 
 /// A function that never fails, in the form of one that may.
-fn total(h: impl Fn(f64, f64) -> f64) -> impl Fn(f64, f64) -> Result<f64> {
-    move |x, y| Ok(h(x, y))
+fn total(h: impl Fn(f64, f64) -> f64 + 'static) -> Function {
+    Box::new(move |x, y| Ok(h(x, y)))
 }
