@@ -8,20 +8,23 @@ use crate::ldlt::Ldlt;
 use crate::symmetric::Symmetric;
 
 /// A multiplier's diagonal is lowered by this much unless it is already below −1e-12, as it is where Ipopt has perturbed it. With less of it, equations that are
-/// closer to dependent have a certain inertia, but rounding errors grow: the second one is for where the first does not do. Each
-/// with how often the random vector of the certificate may be multiplied.
-const STATIC_REGULARIZATIONS: [(f64, usize); 2] = [(1e-8, 3), (1e-11, 6)];
+/// closer to dependent have a certain inertia, but rounding errors grow: the second one is for where the first does not do.
+const STATIC_REGULARIZATIONS: [f64; 2] = [1e-8, 1e-11];
 /// See [`STATIC_REGULARIZATIONS`].
 const PERTURBED: f64 = 1e-12;
 /// The certificate: a random vector of normally distributed numbers has shrunk to this length. Its component along an eigenvector that does not
 /// shrink is shorter than that from the beginning with a probability of less than 1e-3.
 const CERTAIN: f64 = 1e-3;
+/// It is multiplied at most so often …
+const MOST_PROBES: usize = 10;
+/// … and, after the first two times, as long as it shrinks at least to this fraction each time.
+const LEAST_SHRINKAGE: f64 = 0.7;
 /// Refinement ends when the residual is this small against the solution and the right-hand side, max norm …
 const WANTED_RESIDUAL: f64 = 1e-12;
 /// … or when it has become smaller by less than this factor …
-const LEAST_IMPROVEMENT: f64 = 0.5;
+const LEAST_IMPROVEMENT: f64 = 0.7;
 /// … or after so many steps.
-const MOST_STEPS: usize = 6;
+const MOST_STEPS: usize = 10;
 
 /// The sizes of the blocks, in the order of rows: x, s, y_c, y_d.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,23 +193,33 @@ impl Kkt {
 
     fn try_factor(&mut self, values: &[f64]) -> Option<usize> {
         self.matrix.assemble(values);
-        STATIC_REGULARIZATIONS.iter().find_map(|&(regularization, most_probes)| {
+        for regularization in STATIC_REGULARIZATIONS {
             let condensed = self.condenser.reduce(&self.matrix.values, &mut self.ldlt.values)?;
+            let mut regularized = false;
             for &place in &self.multipliers {
                 let diagonal = &mut self.ldlt.values[place as usize];
                 if *diagonal > -PERTURBED {
                     *diagonal -= regularization;
+                    regularized = true;
                 }
             }
             let negative = condensed + self.ldlt.factor()?;
-            self.refinement_converges(most_probes).then_some(negative)
-        })
+            if self.refinement_converges() {
+                return Some(negative);
+            }
+            if !regularized {
+                // Another regularization would give the same matrix.
+                break;
+            }
+        }
+        None
     }
 
     /// Multiplies a random vector by I − M⁻¹K until it is short, and says whether that came about.
-    fn refinement_converges(&mut self, most_probes: usize) -> bool {
+    fn refinement_converges(&mut self) -> bool {
         self.solution.copy_from_slice(&self.random);
-        for _ in 0..most_probes {
+        let mut last = f64::INFINITY;
+        for probe in 0..MOST_PROBES {
             self.statistics.probes += 1;
             self.matrix.residual(&self.zero, &self.solution, &mut self.residual);
             self.correct();
@@ -214,9 +227,10 @@ impl Kkt {
             if length <= CERTAIN {
                 return true;
             }
-            if !length.is_finite() {
+            if !length.is_finite() || (probe >= 2 && length > LEAST_SHRINKAGE * last) {
                 return false;
             }
+            last = length;
         }
         false
     }
