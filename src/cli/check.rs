@@ -11,6 +11,7 @@ use super::figures::figures;
 use crate::check::{CheckLimits, check_with};
 use crate::files::{ensure_outputs, write_atomically};
 use crate::plan::Plan;
+use crate::visible::visible;
 use crate::{Error, Result, report};
 
 const EXAMPLES: &str = "\
@@ -57,7 +58,7 @@ pub(super) fn check(arguments: &CheckArguments, console: &Console) -> Result<End
     let state = if solved { "Solved" } else { "Marked as not solved" };
     console.result(&report::check_table(&found, console.has_color()));
     for remark in &found.remarks {
-        console.result(&format!("claims: {remark}."));
+        console.result(&visible(&format!("claims: {remark}.")));
     }
     console.result(&format!("{state}; {}.", report::check_counts(&found.rows)));
     console.object(&json!({

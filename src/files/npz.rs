@@ -16,7 +16,8 @@ use crate::{Error, Result};
 const MAX_UNPACKED: usize = 512 << 20;
 /// The longest string of an array may take this many bytes, 4 for each character.
 const MAX_STRING: usize = 16 << 20;
-/// The fastest that deflates. zlib's default of 6 takes more than twice the time, for files that are 3 % smaller.
+/// The fastest that deflates: a third of the time of zlib's default, 6, for plans that are 15 to 20 % larger. Level 2 takes two thirds,
+/// for 2 %.
 const DEFLATE_LEVEL: i64 = 1;
 /// Bytes that are unpacked at a time.
 const BLOCK: usize = 1 << 16;
