@@ -108,14 +108,43 @@ fn text_grids_are_read_with_every_separator() {
     assert_eq!(ground_of("a.csv", named.as_bytes(), &keys).report.holes_filled, 2);
     for (text, part) in [
         ("1 2 3 4\n1 2 3\n", "line 2: 3 numbers, but 4 in the first row"),
-        ("1 2 3 4\n1 2 x 4\n", "line 2: \"x\" is no number"),
-        ("0,5;1,5;2,5;3,5\n", "not a format"),
+        ("1 2 3 4\n1 2 x 4\n", "line 2, field 3: \"x\" is no number"),
+        ("0,5;1,5;2,5;3,5\n", "line 1, field 1: \"0,5\" is no number; decimals must have a point"),
+        ("1,2,3,0x10\n", "line 1, field 4: \"0x10\" is no number"),
+        ("1,2,3,4\n\n1,2,3,4\n", "line 2: an empty line between rows"),
         ("1 2 3 4\n1 2 inf 4\n", "line 2: inf is no height"),
         ("0 0 1\n0 1 2\n0 2 3\n0 3 3\n", "a list of points"),
         ("1 2 3 4\n1 2 3 4\n1 2 3 4\n", "4 x 3 cells are too few"),
     ] {
         assert_refused("a.txt", text.as_bytes(), &keys, &[part]);
     }
+}
+
+#[test]
+fn empty_fields_of_text_are_cells_without_data() {
+    let keys = "spacing = 0.1";
+    // Rows and columns without data, at every side and inside.
+    let rows = ["\t\t\t\t\t", "\t1\t2\t3\t\t", "\t\t\t\t\t", "\t4\t5\t6\t\t", "\t7\t8\t9\t\t"];
+    let expected: Vec<f64> = [[7, 8, 9], [4, 5, 6], [0; 3], [1, 2, 3], [0; 3]]
+        .into_iter()
+        .flat_map(|row| [0, row[0], row[1], row[2], 0, 0])
+        .map(|v| if v == 0 { f64::NAN } else { f64::from(v) * 0.1 })
+        .collect();
+    for separator in ["\t", ",", ";"] {
+        let text = format!("{}\n\n", rows.join("\n").replace('\t', separator));
+        let found = ground_of("a.tsv", text.as_bytes(), &format!("{keys}\nheight_scale = 0.1"));
+        assert_eq!([found.field.grid().columns, found.field.grid().rows], [6, 5]);
+        assert_eq!(found.report.holes_filled, expected.iter().filter(|v| v.is_nan()).count());
+        for (raw, v) in found.raw.unwrap().iter().zip(&expected).filter(|(_, v)| !v.is_nan()) {
+            assert!((raw - v).abs() < 1e-12, "{raw} {v}");
+        }
+    }
+    // A separator at the end of every row, and of some only.
+    let found = ground_of("a.csv", "1,2,3,4,\n".repeat(4).as_bytes(), keys);
+    assert_eq!((found.field.grid().columns, has_note(&found, "end of every row")), (4, true));
+    let some = "1,2,3,4,\n".repeat(3) + "1,2,3,4,5\n";
+    assert_eq!(ground_of("a.csv", some.as_bytes(), keys).field.grid().columns, 5);
+    assert_refused("a.csv", b"\xff\xfe1\0,\0", keys, &["text in UTF-16"]);
 }
 
 #[test]
@@ -148,7 +177,7 @@ fn esri_grids_tell_their_place() {
         (head(String::new()).replace("NROWS 5", "NROWS 6"), "35 values, fewer than"),
         (head(String::new()).replace("NROWS 5", "NROWS 4"), "more values than"),
         (head(String::new()).replace("NROWS 5", "NROWS 9999999"), "too many"),
-        (head(String::new()).replace("NROWS 5", "NROWS x"), "line 2: \"x\" is no number"),
+        (head(String::new()).replace("NROWS 5", "NROWS x"), "line 2, field 2: \"x\" is no number"),
         (
             head(String::new()).replace("CELLSIZE 0.02", "CELLSIZE 30"),
             "the file tells 30 m, but allowed are 0.001 to 10",
@@ -186,6 +215,31 @@ fn tiffs_hold_floats_and_integers_with_their_place() {
         assert!(has_note(&found, "in degrees"));
     }
 
+    // Rows from the least y; and what is mirrored, in other units, or perhaps upside down.
+    let (_, upward) = stored("y-up");
+    let upward: Vec<u8> = upward.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+    let [x, y] = CORNER.map(|c| c - 0.5 * SPACING);
+    let turned = |a: f64, e: f64| [a, 0.0, 0.0, x, 0.0, e, 0.0, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let with = |tag: (u16, u16, Vec<u8>)| {
+        let mut tags = gray_tags(32, 3);
+        tags.retain(|(number, ..)| *number != tag.0);
+        tags.push(tag);
+        tiff(&tags, &upward)
+    };
+    let found = ground_of("a.tif", &with((34264, 12, doubles(&turned(SPACING, SPACING)))), "");
+    assert_is_the_ground(&found, [2.0, 1.0], 1e-7);
+    let unit = |key: u16| (34735, 3, [1, 1, 0, 1, key, 0, 1, 9002].map(u16::to_le_bytes).concat());
+    for (tag, part) in [
+        ((34264, 12, doubles(&turned(-SPACING, SPACING))), "columns run against x"),
+        ((33550, 12, doubles(&[SPACING, -SPACING, 0.0])), "negative pixel scale"),
+        (unit(3076), "coordinates in unit 9002, feet"),
+        (unit(4099), "heights in unit 9002, feet"),
+        ((274, 3, short(4)), "orientation 4"),
+        ((262, 3, short(0)), "WhiteIsZero"),
+    ] {
+        assert_refused("a.tif", &with(tag), &keys, &[part]);
+    }
+
     let mut tags = gray_tags(16, 2);
     tags.push((42113, 2, b"-32768\0".to_vec()));
     let integers: Vec<i16> = values
@@ -221,6 +275,13 @@ fn height_fields_of_mujoco_are_normalized_as_mujoco_does() {
     assert_refused("a.bin", &binary, &keys, &["terrain.height_scale: missing", "least to the greatest"]);
     let found = ground_of("a.bin", &binary, &format!("{keys}\nheight_scale = {}", HIGH - LOW));
     assert_is_the_ground(&found, [0.0; 2], 1e-7);
+    // What stands for no data is given as stored, and does not count for the least and the greatest.
+    let mut marked = values.clone();
+    marked[8] = -9999.1;
+    let keys_marked = format!("{keys}\nheight_scale = {}\nno_data = -9999.1", HIGH - LOW);
+    let found = ground_of("a.bin", &hfield(ROWS as i32, COLUMNS as i32, &marked), &keys_marked);
+    assert_eq!(found.report.holes_filled, 1);
+    assert!((found.report.height_range[1] - HIGH).abs() < 1e-7, "{:?}", found.report.height_range);
 
     let (_, downward) = stored("picture");
     let text: Vec<String> = downward.iter().map(|h| (3.0 + 2.0 * h).to_string()).collect();
@@ -248,6 +309,27 @@ fn height_fields_of_mujoco_are_normalized_as_mujoco_does() {
     }
     let turned = model(&elevation, "").replace("quat=\"1 0 0 0\"", "euler=\"0 0 90\"");
     assert_refused("m.xml", turned.as_bytes(), "", &["hfield \"g\": euler turns it"]);
+    let plain = model(&elevation, "");
+    let with = |more: &str| plain.replace("<asset>", &format!("{more}<asset>"));
+    for (more, part) in [
+        ("<include file=\"a.xml\"/>", "includes \"a.xml\""),
+        ("<default><geom euler=\"0 0 90\"/></default>", "a default gives its geom euler"),
+        ("<default><geom hfield=\"g\"/></default>", "a default gives geoms an hfield"),
+    ] {
+        assert_refused("m.xml", with(more).as_bytes(), "", &[part]);
+    }
+    let class = "<default><default class=\"t\"><geom pos=\"1 0 0\"/></default></default>";
+    ground_of("m.xml", with(class).as_bytes(), "");
+    let moved = with(class)
+        .replace("hfield=\"g\" pos=\"1 1 0\"", "hfield=\"g\"")
+        .replace("<body ", "<body childclass=\"t\" ");
+    assert_refused("m.xml", moved.as_bytes(), "", &["a default gives its geom pos"]);
+    let copied =
+        plain.replace("<body ", "<replicate count=\"2\"><body ").replace("</body>", "</body></replicate>");
+    assert_refused("m.xml", copied.as_bytes(), "", &["inside a replicate"]);
+    let more = plain
+        .replace("<worldbody>", "<worldbody><geom size=\"1\"/><body><freejoint/><geom size=\"1\"/></body>");
+    assert!(has_note(&ground_of("m.xml", more.as_bytes(), ""), "1 other geoms of the model"));
     let two = model(&elevation, "<hfield name=\"h\" size=\"1 1 1 1\"/>");
     assert_refused("m.xml", two.as_bytes(), "", &["terrain.member: missing", "g, h"]);
     assert_refused("m.xml", two.as_bytes(), "member = \"i\"", &["no hfield \"i\"", "g, h"]);

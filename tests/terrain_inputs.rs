@@ -58,6 +58,27 @@ fn values_that_stand_for_no_data_are_holes() {
 }
 
 #[test]
+fn values_that_stand_for_no_data_are_compared_as_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let (shape, mut values) = stored("picture");
+    values[3] = 0.0123;
+    let single = values.iter().map(|v| f64::from(*v as f32)).collect::<Vec<_>>();
+    let bytes = npy("<f4", &shape, &single, |v| (*v as f32).to_le_bytes().to_vec());
+    // As numpy.savez stores it.
+    let path = folder.path().join("a.npz");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    zip.start_file("h.npy", zip::write::SimpleFileOptions::default()).unwrap();
+    std::io::Write::write_all(&mut zip, &bytes).unwrap();
+    zip.finish().unwrap();
+    let text = format!("file = \"a.npz\"\nspacing = {SPACING}\nno_data = 0.0123");
+    assert_eq!(ground(&text, folder.path()).report.holes_filled, 1);
+    // 0.0123 and 0 as floats of 2 bytes.
+    let bits: Vec<u16> = (0..35).map(|k| if k == 3 { 0x224c } else { 0 }).collect();
+    fs::write(folder.path().join("a.npy"), npy("<f2", &shape, &bits, |v| v.to_le_bytes().to_vec())).unwrap();
+    assert_eq!(ground(&text.replace(".npz", ".npy"), folder.path()).report.holes_filled, 1);
+}
+
+#[test]
 fn half_floats_are_heights() {
     let folder = tempfile::tempdir().unwrap();
     let (shape, _) = stored("picture");
@@ -90,6 +111,18 @@ fn colors_are_refused() {
     assert_refused("a.png", &png(ColorType::Rgb, Sixteen, [5, 5], None, &wide), &keys, &parts);
     let indices: Vec<u8> = (0..25).collect();
     assert_refused("a.png", &png(ColorType::Indexed, Eight, [5, 5], Some(&data), &indices), &keys, &parts);
+}
+
+#[test]
+fn indices_beyond_a_palette_are_refused() {
+    use png::{BitDepth, ColorType::Indexed};
+    let keys = format!("spacing = {SPACING}\nheight_scale = 0.1");
+    let palette = [0, 0, 0, 9, 9, 9];
+    let part = ["pixel [row 1, column 2] has color 2, but the palette has only 2"];
+    let eight: Vec<u8> = (0..25).map(|k| if k == 7 { 2 } else { 1 }).collect();
+    assert_refused("a.png", &png(Indexed, BitDepth::Eight, [5, 5], Some(&palette), &eight), &keys, &part);
+    let four: Vec<u8> = (0..15).map(|k| if k == 4 { 0x20 } else { 0x10 }).collect();
+    assert_refused("a.png", &png(Indexed, BitDepth::Four, [5, 5], Some(&palette), &four), &keys, &part);
 }
 
 #[test]

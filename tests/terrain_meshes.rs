@@ -106,3 +106,40 @@ fn only_what_a_robot_could_stand_on_is_hidden_ground() {
         found.report.notes
     );
 }
+
+#[test]
+fn concave_faces_cover_only_their_inside() {
+    let keys = "spacing = 0.1";
+    let corners = [
+        [-2.0, -1.0],
+        [-0.35, -1.0],
+        [-0.35, 0.9],
+        [0.35, 0.9],
+        [0.35, -1.0],
+        [2.0, -1.0],
+        [2.0, 1.0],
+        [-2.0, 1.0],
+    ];
+    let vertices =
+        |prefix: &str| corners.iter().map(|[x, y]| format!("{prefix}{x} {y} 0\n")).collect::<String>();
+    let obj = |face: &str| format!("{}f {face}\n", vertices("v "));
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\nelement face 1\n\
+         property list uchar int vertex_indices\nend_header\n{}8 0 1 2 3 4 5 6 7\n",
+        vertices("")
+    );
+    // 7 columns and 19 rows of the notch, whatever corner the face begins with and whichever way it looks.
+    for (name, text) in [
+        ("a.obj", obj("1 2 3 4 5 6 7 8")),
+        ("a.obj", obj("4 5 6 7 8 1 2 3")),
+        ("a.obj", obj("8 7 6 5 4 3 2 1")),
+        ("a.ply", ply),
+    ] {
+        assert_eq!(ground_of(name, text.as_bytes(), keys).report.holes_filled, 7 * 19, "{name}: {text}");
+    }
+    assert_refused("a.obj", obj("1 3 7 4 2 5 8 6").as_bytes(), keys, &["face 1 crosses itself"]);
+    let millimeters = b"v 0 0 0\nv 900000 0 0\nv 0 900000 0\nf 1 2 3\n";
+    assert_refused("a.obj", millimeters, keys, &["if the mesh is in millimeters"]);
+    let stack = format!("v 0 0 0\nv 190 0 0\nv 0 190 0\n{}", "f 1 2 3\n".repeat(900));
+    assert_refused("a.obj", stack.as_bytes(), keys, &["too many faces above each other"]);
+}

@@ -61,8 +61,8 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     let input = Input { bytes: &bytes, path: &path, member: spec.member.as_deref(), spacing: spec.spacing };
     let format = formats::recognize(&input).map_err(located)?;
     let mut raster = (format.decode)(&input).map_err(located)?;
-    drop_no_data(&mut raster, spec);
-    let unit = unit(&raster, spec, format.name)?;
+    raster.drop_no_data(spec.no_data.as_ref().map_or(&[][..], |numbers| numbers.as_slice()));
+    let Scale { zero, unit, base } = scale(&raster, spec, format.name)?;
     let shape = [raster.rows, raster.columns];
     let layout = spec.layout.unwrap_or(raster.layout);
     let value_type = std::mem::take(&mut raster.value_type);
@@ -74,7 +74,7 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     let diagonal = (x_max - x_min).hypot(y_max - y_min);
     let suspicion = suspect::check(&raster.values, unit, diagonal).map_err(located)?;
     for value in &mut raster.values {
-        *value *= unit;
+        *value = (*value - zero) * unit + base;
     }
     let (scan, squared) = placing::scan(&raster, layout, &grid).map_err(located)?;
     let source = Source {
@@ -110,31 +110,32 @@ pub fn ground(
     Ok(ground)
 }
 
-/// Replaces values that stand for no data by NaN.
-fn drop_no_data(raster: &mut Raster, spec: &HeightmapSpec) {
-    let given = spec.no_data.as_ref().map_or(&[][..], |numbers| numbers.as_slice());
-    let all: Vec<f64> = given.iter().chain(&raster.no_data).copied().collect();
-    if all.is_empty() {
-        return;
-    }
-    // Files with floats of 4 bytes hold what is nearest to the number that a user writes.
-    let single = raster.value_type == "float32";
-    let stands_for_none = |v: f64| all.iter().any(|&n| v == n || (single && v as f32 == n as f32));
-    for value in raster.values.iter_mut().filter(|v| stands_for_none(**v)) {
-        *value = f64::NAN;
-    }
+/// From values to heights: `(value - zero) * unit + base`.
+struct Scale {
+    zero: f64,
+    /// Height of one unit of the values, m.
+    unit: f64,
+    /// m.
+    base: f64,
 }
 
-/// Height of one unit of the values, m.
-fn unit(raster: &Raster, spec: &HeightmapSpec, format: &str) -> Result<f64> {
+fn scale(raster: &Raster, spec: &HeightmapSpec, format: &str) -> Result<Scale> {
     let needed = |what: &str| {
         let refusal = || Error::key("terrain.height_scale", format!("missing; {format} needs it: {what}"));
         spec.height_scale.ok_or_else(refusal)
     };
-    Ok(match raster.meaning {
-        Values::Meters => spec.height_scale.unwrap_or(1.0),
+    let factor = spec.height_scale.unwrap_or(1.0);
+    let unit = match raster.meaning {
+        Values::Meters => factor,
+        Values::Mapped { zero, unit, base } => {
+            return Ok(Scale { zero, unit: factor * unit, base: factor * base });
+        }
         Values::Levels { white } => needed("the height in m from black to white")? / white,
-        Values::Normalized => needed("the height in m from the least to the greatest value")?,
+        Values::Normalized => {
+            let height = needed("the height in m from the least to the greatest value")?;
+            let (zero, span) = raster.least_and_span();
+            return Ok(Scale { zero, unit: height / span, base: 0.0 });
+        }
         Values::Integers => {
             let (low, high) = super::raster::range(&raster.values);
             needed(&format!(
@@ -142,5 +143,6 @@ fn unit(raster: &Raster, spec: &HeightmapSpec, format: &str) -> Result<f64> {
                 raster.value_type
             ))?
         }
-    })
+    };
+    Ok(Scale { zero: 0.0, unit, base: 0.0 })
 }

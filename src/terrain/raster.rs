@@ -23,6 +23,8 @@ pub struct Raster {
     pub meaning: Values,
     /// The type of a value, in messages.
     pub value_type: String,
+    /// How the file rounds values.
+    pub precision: Precision,
     /// Which way i and j run, unless the scenario says otherwise.
     pub layout: Layout,
     /// Distance between neighboring cells along x and y, m, if the file tells.
@@ -49,14 +51,56 @@ pub enum Values {
         /// The greatest level.
         white: f64,
     },
-    /// A fraction from 0 to 1; `terrain.height_scale` is the height of 1.
+    /// A number in a unit and from a zero of its own; `terrain.height_scale` is the height of the greatest above the least.
     Normalized,
+    /// A number that the file itself maps to a height: `(value - zero) * unit + base`, in m.
+    Mapped {
+        /// The value at the height `base`.
+        zero: f64,
+        /// Height of one unit, m.
+        unit: f64,
+        /// Height of `zero`, m.
+        base: f64,
+    },
+}
+
+/// How a file rounds the numbers that it stores.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Precision {
+    /// Floats of 2 bytes.
+    Half,
+    /// Floats of 4 bytes.
+    Single,
+    /// Everything else.
+    Exact,
+}
+
+impl Precision {
+    /// The number that is stored for `v`.
+    fn rounded(self, v: f64) -> f64 {
+        match self {
+            Self::Exact => v,
+            Self::Single => f64::from(v as f32),
+            Self::Half if v == 0.0 || !v.is_finite() => v,
+            Self::Half => {
+                // 11 significant bits, fewer below 2^-14.
+                let step = 2.0_f64.powi(v.abs().log2().floor().max(-14.0) as i32 - 10);
+                (v / step).round_ties_even() * step
+            }
+        }
+    }
 }
 
 impl Raster {
     /// A raster stored like a picture, of which the file says nothing else.
     pub fn new(columns: usize, rows: usize, values: Vec<f64>, meaning: Values, value_type: String) -> Self {
+        let precision = match value_type.as_str() {
+            "float16" => Precision::Half,
+            "float32" => Precision::Single,
+            _ => Precision::Exact,
+        };
         Self {
+            precision,
             columns,
             rows,
             values,
@@ -68,6 +112,22 @@ impl Raster {
             no_data: Vec::new(),
             notes: Vec::new(),
             inputs: Vec::new(),
+        }
+    }
+
+    /// The least value, and how far the greatest is above it: 1 if all are the same.
+    pub fn least_and_span(&self) -> (f64, f64) {
+        let (low, high) = range(&self.values);
+        (low, if high > low { high - low } else { 1.0 })
+    }
+
+    /// Replaces values that stand for no data, those given and those that the file tells, by NaN. They are compared as stored: a
+    /// file with floats of 2 or 4 bytes holds what is nearest to the number that a user writes.
+    pub fn drop_no_data(&mut self, given: &[f64]) {
+        let stored = |n: &f64| self.precision.rounded(*n);
+        let all: Vec<f64> = given.iter().chain(&self.no_data).flat_map(|n| [*n, stored(n)]).collect();
+        for value in self.values.iter_mut().filter(|v| all.contains(v)) {
+            *value = f64::NAN;
         }
     }
 }
@@ -112,6 +172,21 @@ pub fn bilinear(columns: usize, heights: &[f64], column: f64, row: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_rounded_as_floats_of_two_bytes_are() {
+        for (given, stored) in [
+            (-9999.0, -10000.0),
+            (0.1, 0.0999755859375),
+            (0.0123, 0.012298583984375),
+            (4e-8, 2.0_f64.powi(-24)),
+            (1.0 + 1.0 / 2048.0, 1.0),
+            (0.0, 0.0),
+        ] {
+            assert_eq!(Precision::Half.rounded(given), stored, "{given}");
+        }
+        assert_eq!(Precision::Single.rounded(0.1), f64::from(0.1_f32));
+    }
 
     #[test]
     fn the_limits_are_those_of_a_heightfield() {

@@ -1,11 +1,11 @@
 //! MuJoCo's binary height field: the numbers of rows and columns as int32, then float32 values, the first row at the least y.
 //!
-//! MuJoCo brings the values to 0…1 and multiplies them by the third number of the asset's `size`, which is not in the file.
+//! MuJoCo brings the values to 0…1, here without those that stand for no data, and multiplies them by the third number of the asset's `size`, which is not in the file.
 
 use super::input::Input;
 use crate::error::{Error, Result};
 use crate::scenario::terrain::Layout;
-use crate::terrain::raster::{Raster, Values, check_size, range};
+use crate::terrain::raster::{Raster, Values, check_size};
 
 /// Rows and columns, if the file's length is what they tell.
 fn shape(bytes: &[u8]) -> Option<[u64; 2]> {
@@ -27,9 +27,7 @@ pub fn is_hfield(input: &Input) -> bool {
 /// # Errors
 /// If it is too small or too large, or a value is not finite.
 pub fn decode(input: &Input) -> Result<Raster> {
-    let mut raster = values(input.bytes)?;
-    normalize(&mut raster);
-    Ok(raster)
+    values(input.bytes)
 }
 
 /// The values as they are in the file.
@@ -48,17 +46,7 @@ pub fn values(bytes: &[u8]) -> Result<Raster> {
         return Err(Error::input(format!("value [{row}, {column}] is {}, no height", values[i])));
     }
     let mut raster =
-        Raster::new(columns as usize, rows as usize, values, Values::Meters, "float32".to_owned());
+        Raster::new(columns as usize, rows as usize, values, Values::Normalized, "float32".to_owned());
     raster.layout = Layout::YUp;
     Ok(raster)
-}
-
-/// Brings values to 0…1, as MuJoCo does.
-pub fn normalize(raster: &mut Raster) {
-    let (low, high) = range(&raster.values);
-    let span = if high > low { high - low } else { 1.0 };
-    for value in &mut raster.values {
-        *value = (*value - low) / span;
-    }
-    raster.meaning = Values::Normalized;
 }

@@ -36,6 +36,9 @@ pub fn decode(input: &Input) -> Result<Raster> {
         let what = format!("not a valid PNG image: a palette of {} bytes", palette.len());
         return Err(Error::input(format!("{what}; it must be 3 for each of at most {MOST_COLORS} colors")));
     }
+    if let (ColorType::Indexed, Some(palette)) = (reader.info().color_type, &reader.info().palette) {
+        ensure_colors(input.bytes, palette.len() / 3)?;
+    }
     let size = reader.output_buffer_size().ok_or_else(|| Error::input("the image is too large"))?;
     let mut buffer = vec![0; size];
     let frame = reader.next_frame(&mut buffer).map_err(complain)?;
@@ -57,6 +60,31 @@ pub fn decode(input: &Input) -> Result<Raster> {
     let values = (0..columns * rows).map(|pixel| pixels.level(pixel, &sample)).collect::<Result<_>>()?;
     let bits = if wide { 16 } else { 8 };
     Ok(Raster::new(columns, rows, values, Values::Levels { white: pixels.white }, format!("{bits} bit gray")))
+}
+
+/// Refuses indices beyond the colors of a palette, which the decoder takes for black.
+fn ensure_colors(bytes: &[u8], colors: usize) -> Result<()> {
+    let complain = |e: png::DecodingError| Error::input(format!("not a valid PNG image: {e}"));
+    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: 256 << 20 });
+    decoder.set_transformations(Transformations::IDENTITY);
+    let mut reader = decoder.read_info().map_err(complain)?;
+    let bits = reader.info().bit_depth as usize;
+    let size = reader.output_buffer_size().ok_or_else(|| Error::input("the image is too large"))?;
+    let mut buffer = vec![0; size];
+    let frame = reader.next_frame(&mut buffer).map_err(complain)?;
+    let (columns, mask) = (frame.width as usize, 0xff >> (8 - bits));
+    for (row, line) in buffer.chunks_exact(frame.line_size).take(frame.height as usize).enumerate() {
+        for column in 0..columns {
+            let bit = column * bits;
+            let index = usize::from((line[bit / 8] >> (8 - bits - bit % 8)) & mask);
+            if index >= colors {
+                return Err(Error::input(format!(
+                    "not a valid PNG image: pixel [row {row}, column {column}] has color {index}, but the palette has only {colors}"
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// How the channels of an image make a gray level; also used for TIFF.

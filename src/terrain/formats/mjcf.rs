@@ -38,6 +38,13 @@ pub fn decode(input: &Input) -> Result<Raster> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..Default::default() };
     let document =
         Document::parse_with_options(text, options).map_err(|e| Error::input(format!("not XML: {e}")))?;
+    if let Some(include) = document.descendants().find(|node| node.has_tag_name("include")) {
+        let file = include.attribute("file").unwrap_or_default();
+        let what = format!(
+            "the model includes {file:?}, which is not read; give a model without include, as MuJoCo's mj_saveLastXML writes it"
+        );
+        return Err(Error::input(what));
+    }
     let field = chosen(&document, input.member)?;
     let name = name(field);
     let refuse = |what: String| Error::input(format!("hfield {name:?}: {what}"));
@@ -48,12 +55,10 @@ pub fn decode(input: &Input) -> Result<Raster> {
         return Err(refuse("size must have four positive numbers".to_owned()));
     };
     let mut raster = values(&document, field, input).map_err(|e| refuse(e.to_string()))?;
-    hfield::normalize(&mut raster);
     let (place, note) = place(&document, &name).map_err(refuse)?;
-    for value in &mut raster.values {
-        *value = *value * z + place[2];
-    }
-    raster.meaning = Values::Meters;
+    // As MuJoCo has it: a value that stands for no data counts for the least and the greatest, too.
+    let (zero, span) = raster.least_and_span();
+    raster.meaning = Values::Mapped { zero, unit: z / span, base: place[2] };
     let spacing = |radius: f64, count: usize| 2.0 * radius / (count - 1) as f64;
     raster.spacing = Some([spacing(*x, raster.columns), spacing(*y, raster.rows)]);
     raster.corner = Some([place[0] - x, place[1] - y]);
@@ -96,12 +101,7 @@ fn chosen<'a>(document: &'a Document, wanted: Option<&str>) -> Result<Node<'a, '
     let fields: Vec<Node> = document.descendants().filter(|node| node.has_tag_name("hfield")).collect();
     let names = || fields.iter().map(|field| name(*field)).collect::<Vec<_>>().join(", ");
     match (wanted, &fields[..]) {
-        (_, []) => {
-            let included = document.descendants().any(|node| node.has_tag_name("include"));
-            let hint =
-                if included { "; files that it includes are not read, give the one that has it" } else { "" };
-            Err(Error::input(format!("a MuJoCo model without hfield{hint}")))
-        }
+        (_, []) => Err(Error::input("a MuJoCo model without hfield")),
         (None, [only]) => Ok(*only),
         (None, _) => {
             let what = format!("missing; the model has {} height fields: {}", fields.len(), names());
@@ -166,8 +166,12 @@ fn path(document: &Document, file: &str, model: &Path) -> PathBuf {
 
 /// The place of the only geom that uses a height field, and a note if there is none.
 fn place(document: &Document, name: &str) -> std::result::Result<([f64; 3], Option<String>), String> {
-    let uses = |node: &Node| node.has_tag_name("geom") && node.attribute("hfield") == Some(name);
-    let geoms: Vec<Node> = document.descendants().filter(uses).collect();
+    let in_default = |node: &Node| node.ancestors().any(|ancestor| ancestor.has_tag_name("default"));
+    let all = || document.descendants().filter(|node| node.has_tag_name("geom"));
+    if all().any(|node| in_default(&node) && node.attribute("hfield").is_some()) {
+        return Err("a default gives geoms an hfield; write it at the geom that is the ground".to_owned());
+    }
+    let geoms: Vec<Node> = all().filter(|node| node.attribute("hfield") == Some(name)).collect();
     let geom = match &geoms[..] {
         [only] => only,
         [] => {
@@ -178,13 +182,14 @@ fn place(document: &Document, name: &str) -> std::result::Result<([f64; 3], Opti
         }
         _ => return Err(format!("{} geoms use it; only one can be the ground", geoms.len())),
     };
+    ensure_no_defaults(document, *geom)?;
     let mut place = [0.0; 3];
     for node in geom.ancestors().filter(|node| node.is_element()) {
-        for turn in TURNS {
-            let identity = if turn == "quat" { vec![1.0, 0.0, 0.0, 0.0] } else { vec![0.0; 3] };
-            if numbers(node, turn)?.is_some_and(|given| given != identity) {
-                return Err(format!("{turn} turns it; ground must not be turned"));
-            }
+        if node.has_tag_name("replicate") {
+            return Err("it is inside a replicate, which is not read; write the geom out".to_owned());
+        }
+        if let Some(turn) = turn(node)? {
+            return Err(format!("{turn} turns it; ground must not be turned"));
         }
         if let Some(offset) = numbers(node, "pos")? {
             let offset: &[f64; 3] =
@@ -192,5 +197,51 @@ fn place(document: &Document, name: &str) -> std::result::Result<([f64; 3], Opti
             place.iter_mut().zip(offset).for_each(|(sum, part)| *sum += part);
         }
     }
-    Ok((place, None))
+    let others = all().filter(|node| node != geom && !in_default(node) && stays(node)).count();
+    let note =
+        format!("{others} other geoms of the model that do not move are left out; only the hfield is ground");
+    Ok((place, (others > 0).then_some(note)))
+}
+
+/// The attribute that turns a body or a geom.
+fn turn(node: Node) -> std::result::Result<Option<&'static str>, String> {
+    for turn in TURNS {
+        let identity = if turn == "quat" { vec![1.0, 0.0, 0.0, 0.0] } else { vec![0.0; 3] };
+        if numbers(node, turn)?.is_some_and(|given| given != identity) {
+            return Ok(Some(turn));
+        }
+    }
+    Ok(None)
+}
+
+/// Refuses a geom that a default moves or turns.
+fn ensure_no_defaults(document: &Document, geom: Node) -> std::result::Result<(), String> {
+    let of_body = || geom.ancestors().skip(1).find_map(|node| node.attribute("childclass"));
+    let class = geom.attribute("class").or_else(of_body);
+    let is_default = |node: &Node| node.has_tag_name("default");
+    // The outermost ones hold for every geom, and a class takes over from those around it.
+    let outermost = |node: &Node| is_default(node) && !node.ancestors().skip(1).any(|n| is_default(&n));
+    let applies = |node: &Node| {
+        let of_class =
+            |inner: Node| is_default(&inner) && class.is_some() && inner.attribute("class") == class;
+        outermost(node) || (is_default(node) && node.descendants().any(of_class))
+    };
+    for default in document.descendants().filter(applies) {
+        for given in default.children().filter(|node| node.has_tag_name("geom")) {
+            let moved = numbers(given, "pos")?.is_some_and(|pos| pos != [0.0; 3]);
+            if let Some(what) = turn(given)?.or((moved && !geom.has_attribute("pos")).then_some("pos")) {
+                return Err(format!(
+                    "a default gives its geom {what}; write pos at the geom itself, not turned"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether a geom is fixed to the world.
+fn stays(geom: &Node) -> bool {
+    let is_joint = |node: Node| node.has_tag_name("joint") || node.has_tag_name("freejoint");
+    geom.ancestors().any(|node| node.has_tag_name("worldbody"))
+        && !geom.ancestors().any(|node| node.has_tag_name("body") && node.children().any(is_joint))
 }

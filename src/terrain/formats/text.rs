@@ -8,6 +8,8 @@ use crate::terrain::raster::{Raster, Values, check_size};
 const LOOKED_AT: usize = 4096;
 /// Lines that start like this hold no numbers.
 const COMMENTS: [char; 2] = ['#', '%'];
+/// The first bytes of text in UTF-16.
+const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 /// Keys of the header of an ESRI grid.
 const KEYS: [&str; 10] = [
     "ncols",
@@ -29,14 +31,19 @@ pub fn is_esri(input: &Input) -> bool {
     ["ncols", "nrows"].contains(&word.as_str())
 }
 
-/// Whether a file starts with lines of numbers, after comments and at most one line of names.
+/// Whether a file starts with lines of numbers, after comments and at most one line of names; or is called so and starts as text.
 pub fn is_grid(input: &Input) -> bool {
+    let is_called_so = ["csv", "tsv", "txt"].into_iter().any(|name| input.ends_in(name));
+    if is_called_so && UTF_16.iter().any(|mark| input.bytes.starts_with(mark)) {
+        return true;
+    }
     let start = start(input.bytes);
-    let mut lines = content(&start).map(|(_, line)| line).take(2);
-    let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
-    let numbers =
-        |line: &str| fields(line).next().is_some() && fields(line).all(|field| number(field).is_some());
-    numbers(first) || (numbers(second) && (input.ends_in("csv") || input.ends_in("txt")))
+    let separator = Separator::of(&start);
+    let Some((_, first)) = content(&start).find(|(_, line)| !line.trim().is_empty()) else { return false };
+    let mut fields = separator.fields(first);
+    // Numbers that are written in another way are complained of when they are read.
+    fields.clone().all(|field| number(field).is_some())
+        || (is_called_so && !super::mesh::is_obj(input) && fields.any(|field| !field.is_empty()))
 }
 
 /// The start of a file as text, up to what is none; control characters are none. What may be half a word is left out.
@@ -50,19 +57,45 @@ fn start(bytes: &[u8]) -> String {
     text[..end.unwrap_or(text.len())].trim_start_matches('\u{feff}').to_owned()
 }
 
-/// The lines with content, with their numbers from 1.
+/// The lines without comments, with their numbers from 1. Spaces around them are left out, tabs are not.
 fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
-    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with(COMMENTS))
+    let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim_matches([' ', '\r'])));
+    lines.filter(|(_, line)| !line.trim_start().starts_with(COMMENTS))
 }
 
-/// The fields of a line: between commas, semicolons or tabs, or else between spaces.
-fn fields(line: &str) -> impl Iterator<Item = &str> {
-    let separator = [';', ',', '\t'].into_iter().find(|c| line.contains(*c));
-    let line = line.trim_end_matches([',', ';']);
-    line.split(move |c: char| separator.map_or(c.is_whitespace(), |s| c == s))
-        .map(str::trim)
-        .filter(move |field| separator.is_some() || !field.is_empty())
+/// What is between the fields of all lines: a character, or else any space.
+#[derive(Clone, Copy)]
+struct Separator(Option<char>);
+
+impl Separator {
+    /// That of the first line that does not hold names.
+    fn of(text: &str) -> Self {
+        let of_line = |line: &str| {
+            let found = [';', ',', '\t'].into_iter().find(|c| line.contains(*c));
+            // Numbers with tabs and spaces between them.
+            let mixed = |c| line.split(c).any(|field| field.trim().contains(' '));
+            Self(found.filter(|c| *c != '\t' || !mixed(*c)))
+        };
+        let mut lines = content(text).map(|(_, line)| line).filter(|line| !line.is_empty());
+        let first = lines.next().unwrap_or_default();
+        let separator = of_line(first);
+        if separator.has_names(first) { lines.next().map_or(separator, of_line) } else { separator }
+    }
+
+    /// The fields of a line. Of separated ones, some may be empty.
+    fn fields(self, line: &str) -> impl Iterator<Item = &str> + Clone {
+        line.split(move |c: char| self.0.map_or(c.is_whitespace(), |s| c == s))
+            .map(str::trim)
+            .filter(move |field| self.0.is_some() || !field.is_empty())
+    }
+
+    /// Whether a line holds names, not numbers written in some way.
+    fn has_names(self, line: &str) -> bool {
+        let is_name = |field: &str| {
+            number(field).is_none() && !field.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
+        };
+        self.fields(line).all(is_name)
+    }
 }
 
 /// A number; NaN for an empty field.
@@ -70,7 +103,16 @@ fn number(field: &str) -> Option<f64> {
     if field.is_empty() { Some(f64::NAN) } else { field.parse().ok() }
 }
 
+/// Whether every row ends in a separator.
+fn ends_all(text: &str, separator: Separator) -> bool {
+    let mut rows = content(text).map(|(_, line)| line).filter(|line| !line.is_empty());
+    rows.all(|line| separator.has_names(line) || line.ends_with(|c| Some(c) == separator.0))
+}
+
 fn text(bytes: &[u8]) -> Result<&str> {
+    if UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
+        return Err(Error::input("text in UTF-16; save it in UTF-8"));
+    }
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
         Error::input(format!("line {line}: not text in UTF-8"))
@@ -78,9 +120,9 @@ fn text(bytes: &[u8]) -> Result<&str> {
     Ok(text.trim_start_matches('\u{feff}'))
 }
 
-fn wrong(line: usize, field: &str) -> Error {
+fn wrong(line: usize, number: usize, field: &str) -> Error {
     let shown: String = field.chars().take(20).collect();
-    Error::input(format!("line {line}: {shown:?} is no number; decimals must have a point"))
+    Error::input(format!("line {line}, field {number}: {shown:?} is no number; decimals must have a point"))
 }
 
 /// Decodes rows of numbers, one row a line. Empty fields and `nan` have no data.
@@ -89,15 +131,25 @@ fn wrong(line: usize, field: &str) -> Error {
 /// For what is no number, rows of different lengths, and grids that are too small or too large.
 pub fn grid(input: &Input) -> Result<Raster> {
     let text = text(input.bytes)?;
-    let (mut values, mut columns, mut rows) = (Vec::new(), 0, 0);
-    for (i, (line, content)) in content(text).enumerate() {
-        if i == 0 && fields(content).all(|field| number(field).is_none()) {
-            // Names of the columns.
+    let separator = Separator::of(text);
+    let (mut values, mut columns, mut rows, mut blank) = (Vec::new(), 0, 0, None);
+    let mut is_first = true;
+    for (line, content) in content(text) {
+        if content.trim().is_empty() && (separator.0.is_none() || content.is_empty()) {
+            blank = blank.or(Some(line).filter(|_| rows > 0 && separator.0.is_some()));
             continue;
         }
+        if std::mem::take(&mut is_first) && separator.has_names(content) {
+            continue;
+        }
+        if let Some(line) = blank {
+            let what =
+                "an empty line between rows; leave it out, or write the separators of a row without data";
+            return Err(Error::input(format!("line {line}: {what}")));
+        }
         let before = values.len();
-        for field in fields(content) {
-            let value = number(field).ok_or_else(|| wrong(line, field))?;
+        for (k, field) in separator.fields(content).enumerate() {
+            let value = number(field).ok_or_else(|| wrong(line, k + 1, field))?;
             if value.is_infinite() {
                 return Err(Error::input(format!(
                     "line {line}: {field} is no height; write nan where there is no data"
@@ -119,13 +171,32 @@ pub fn grid(input: &Input) -> Result<Raster> {
             check_size(columns as u64, rows)?;
         }
     }
+    let mut notes = Vec::new();
+    let is_empty = |column: usize| values.iter().skip(column).step_by(columns).all(|v: &f64| v.is_nan());
+    if separator.0.is_some()
+        && columns > 1
+        && is_empty(columns - 1)
+        && !is_empty(columns - 2)
+        && ends_all(text, separator)
+    {
+        notes.push("the separator at the end of every row is left out".to_owned());
+        let all = columns;
+        let mut k = 0;
+        values.retain(|_| {
+            k += 1;
+            k % all != 0
+        });
+        columns -= 1;
+    }
     if columns == 3 {
         return Err(Error::input(
             "3 columns: a list of points x, y, z is no grid of heights; rasterize it first",
         ));
     }
     check_size(columns as u64, rows)?;
-    Ok(Raster::new(columns, rows as usize, values, Values::Meters, "text".to_owned()))
+    let mut raster = Raster::new(columns, rows as usize, values, Values::Meters, "text".to_owned());
+    raster.notes = notes;
+    Ok(raster)
 }
 
 /// Decodes an ESRI ASCII grid; the first row has the largest y.
@@ -144,7 +215,8 @@ pub fn esri(input: &Input) -> Result<Raster> {
             && values.is_empty()
         {
             let (line, word) = words.next().unwrap_or((line, ""));
-            header[key] = Some(number(word).filter(|_| !word.is_empty()).ok_or_else(|| wrong(line, word))?);
+            header[key] =
+                Some(number(word).filter(|_| !word.is_empty()).ok_or_else(|| wrong(line, 2, word))?);
             continue;
         }
         if size.is_none() {
@@ -157,7 +229,8 @@ pub fn esri(input: &Input) -> Result<Raster> {
             check_size(columns, rows)?;
             size = Some((columns as usize, rows as usize));
         }
-        let value = number(word).ok_or_else(|| wrong(line, word))?;
+        let value =
+            number(word).ok_or_else(|| wrong(line, values.len() % size.map_or(1, |s| s.0) + 1, word))?;
         if value.is_infinite() {
             return Err(Error::input(format!("line {line}: {word} is no height")));
         }

@@ -9,6 +9,7 @@ use tiff::tags::Tag;
 use super::image::Pixels;
 use super::input::Input;
 use crate::error::{Error, Result};
+use crate::scenario::terrain::Layout;
 use crate::terrain::raster::{Raster, Values, check_size};
 
 /// The first bytes of TIFF files of both byte orders, also of large ones.
@@ -28,6 +29,9 @@ const NO_DATA: Tag = Tag::Unknown(42113);
 /// Keys among `KEYS`: what coordinates are, and whether they are those of a cell's corner (1) or center (2).
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
+/// Keys among `KEYS`: the units of coordinates and of heights, and the meter.
+const UNITS: [(u16, &str); 2] = [(3076, "coordinates"), (4099, "heights")];
+const METER: u16 = 9001;
 
 /// Decodes the first image of a file; the first row has the largest y.
 ///
@@ -56,7 +60,8 @@ pub fn decode(input: &Input) -> Result<Raster> {
             )));
         }
     };
-    let geography = Geography::read(&mut decoder);
+    ensure_upright(&mut decoder)?;
+    let geography = Geography::read(&mut decoder)?;
     let content = decoder.read_image().map_err(complain)?;
     let (samples, value_type, meaning) = samples(content);
     if samples.len() != columns * rows * channels {
@@ -93,6 +98,21 @@ pub fn decode(input: &Input) -> Result<Raster> {
     Ok(raster)
 }
 
+/// Refuses files that say that rows run another way than from the top, or that values are upside down.
+fn ensure_upright<R: std::io::Read + std::io::Seek>(decoder: &mut Decoder<R>) -> Result<()> {
+    let mut number = |tag: Tag| decoder.get_tag_unsigned::<u16>(tag).ok();
+    if let Some(other) = number(Tag::Orientation).filter(|orientation| *orientation != 1) {
+        let what = format!("a TIFF file with orientation {other}; it must be 1: the first row is the top");
+        return Err(Error::input(what));
+    }
+    if number(Tag::PhotometricInterpretation) == Some(0) {
+        let what = "a TIFF file with the photometric interpretation WhiteIsZero, where heights may be upside down; write it with \
+                    BlackIsZero";
+        return Err(Error::input(what));
+    }
+    Ok(())
+}
+
 /// All samples with the name of their type and what they mean.
 fn samples(content: DecodingResult) -> (Vec<f64>, &'static str, Values) {
     fn floats<T: Into<f64>>(values: Vec<T>) -> Vec<f64> {
@@ -121,27 +141,54 @@ struct Geography {
     tie: Option<[f64; 4]>,
     /// Whether points are centers of cells, not corners.
     centers: bool,
+    /// Whether the first row has the least y.
+    upward: bool,
     no_data: Option<f64>,
     notes: Vec<String>,
 }
 
 impl Geography {
-    fn read<R: std::io::Read + std::io::Seek>(decoder: &mut Decoder<R>) -> Self {
+    /// # Errors
+    /// For units other than the meter, and mirrored georeferences.
+    fn read<R: std::io::Read + std::io::Seek>(decoder: &mut Decoder<R>) -> Result<Self> {
         let mut numbers = |tag: Tag| decoder.get_tag_f64_vec(tag).unwrap_or_default();
         let (scale, tie, transformation) = (numbers(SCALE), numbers(TIEPOINT), numbers(TRANSFORMATION));
         let keys = decoder.get_tag_u16_vec(KEYS).unwrap_or_default();
         // A header of four numbers, then key, place (0: here), count and value.
         let key = |wanted: u16| keys.as_chunks::<4>().0.iter().skip(1).find(|k| k[0] == wanted).map(|k| k[3]);
         let no_data = decoder.get_tag_ascii_string(NO_DATA).ok();
+        for (unit, what) in UNITS {
+            if let Some(code) = key(unit).filter(|code| *code != METER) {
+                return Err(Error::input(format!(
+                    "a GeoTIFF file with {what} in unit {code}{}; convert it to meters",
+                    match code {
+                        9002 => ", feet",
+                        9003 => ", US survey feet",
+                        _ => "",
+                    }
+                )));
+            }
+        }
+        if scale.iter().take(2).any(|s| *s < 0.0) {
+            let what = "a GeoTIFF file with a negative pixel scale, which programs read in different ways; write it with the first \
+                        row at the largest y and a positive scale";
+            return Err(Error::input(what));
+        }
         let mut found = Self {
-            spacing: scale.first_chunk::<2>().map(|s| s.map(f64::abs)),
+            upward: false,
+            spacing: scale.first_chunk::<2>().copied(),
             tie: tie.first_chunk::<6>().map(|t| [t[0], t[1], t[3], t[4]]),
             centers: key(RASTER_TYPE) == Some(2),
             no_data: no_data.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok()),
             notes: Vec::new(),
         };
         if let [a, b, _, x, d, e, _, y, ..] = transformation[..] {
-            if b == 0.0 && d == 0.0 {
+            if b == 0.0 && d == 0.0 && a < 0.0 {
+                return Err(Error::input(
+                    "a GeoTIFF file whose columns run against x; write it with the first column at the least x",
+                ));
+            } else if b == 0.0 && d == 0.0 {
+                found.upward = e > 0.0;
                 found.spacing = Some([a.abs(), e.abs()]);
                 found.tie = Some([0.0, 0.0, x, y]);
             } else {
@@ -152,7 +199,7 @@ impl Geography {
             found.notes.push("the file's georeference is in degrees, which is left out".to_owned());
             (found.spacing, found.tie) = (None, None);
         }
-        found
+        Ok(found)
     }
 
     fn apply(self, raster: &mut Raster) {
@@ -163,7 +210,11 @@ impl Geography {
         {
             let half = if self.centers { 0.0 } else { 0.5 };
             let last = (raster.rows - 1) as f64;
-            raster.corner = Some([x + (half - column) * dx, y - (last + half - row) * dy]);
+            let y = if self.upward { y + (half - row) * dy } else { y - (last + half - row) * dy };
+            raster.corner = Some([x + (half - column) * dx, y]);
+        }
+        if self.upward {
+            raster.layout = Layout::YUp;
         }
         raster.no_data.extend(self.no_data);
         raster.notes.extend(self.notes);

@@ -2,6 +2,7 @@
 
 mod obj;
 mod ply;
+mod polygon;
 mod rays;
 mod stl;
 mod triangles;
@@ -19,8 +20,10 @@ pub use stl::is_stl;
 const MOST_RAYS: u64 = 4_000_000;
 /// A mesh with a larger fraction of rays that meet no face is refused: a vertex far away makes the grid.
 const MOST_MISSED: f64 = 0.99;
-/// Rays times the triangles that they meet; more would take minutes.
-const MOST_HITS: f64 = 3e8;
+/// Rays times the triangles that they meet; more would take over about 5 s.
+const MOST_HITS: f64 = 4e7;
+/// Meshes from this size on are perhaps in millimeters, m.
+const LARGE: f64 = 100.0;
 
 /// Decodes an OBJ file.
 ///
@@ -69,7 +72,8 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
     let count = |length: f64| (length / spacing + rays::SEAM).floor().min(1e12) as u64 + 1;
     let (columns, rows) = (count(x), count(y));
     let refuse = |what: &dyn std::fmt::Display| {
-        Error::key("terrain.spacing", format!("given {spacing}: {size}: {what}"))
+        let unit = if x.max(y) > LARGE { "; if the mesh is in millimeters, bring it to meters" } else { "" };
+        Error::key("terrain.spacing", format!("given {spacing}: {size}: {what}{unit}"))
     };
     check_size(columns, rows).map_err(|e| refuse(&e))?;
     if columns * rows > MOST_RAYS {
@@ -84,7 +88,9 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
         rows: rows as usize,
     };
     if grid.work(&triangles) > MOST_HITS {
-        return Err(refuse(&"too many faces above each other for so many rays; give a larger one"));
+        return Err(refuse(
+            &"too many faces above each other for so many rays; give a larger one, or simplify the mesh",
+        ));
     }
     let seen = grid.cast(&triangles);
     let missed = seen.heights.iter().filter(|h| h.is_nan()).count();

@@ -3,6 +3,7 @@
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
+use super::polygon::Splitter;
 use super::triangles::{MOST_TRIANGLES, Triangles, ensure_few};
 use crate::error::{Error, Result};
 
@@ -65,7 +66,7 @@ impl PropertyAccess for Other {
     }
 }
 
-/// The triangles; larger faces are split into fans.
+/// The triangles; larger faces are split.
 ///
 /// # Errors
 /// If it is damaged or too large.
@@ -105,15 +106,14 @@ pub fn triangles(bytes: &[u8]) -> Result<Triangles> {
         }
     }
     let mut triangles = Vec::with_capacity(faces.len().min(MOST_TRIANGLES));
+    let mut splitter = Splitter::default();
     for Face(face) in &faces {
         let corner = |i: &i64| usize::try_from(*i).ok().and_then(|i| vertices.get(i)).map(|vertex| vertex.0);
         let corners: Option<Vec<[f64; 3]>> = face.iter().map(corner).collect();
         let Some(corners) = corners else {
             return Err(complain(&"a face with a vertex that does not exist"));
         };
-        if let [first, rest @ ..] = &corners[..] {
-            triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-        }
+        splitter.split(&corners, &mut triangles)?;
         ensure_few(triangles.len())?;
     }
     Ok(triangles)
