@@ -152,7 +152,7 @@ pub fn grid(input: &Input) -> Result<Raster> {
             let value = number(field).ok_or_else(|| wrong(line, k + 1, field))?;
             if value.is_infinite() {
                 return Err(Error::input(format!(
-                    "line {line}: {field} is no height; write nan where there is no data"
+                    "line {line}: {field:.20} is no height; write nan where there is no data"
                 )));
             }
             values.push(value);
@@ -232,7 +232,7 @@ pub fn esri(input: &Input) -> Result<Raster> {
         let value =
             number(word).ok_or_else(|| wrong(line, values.len() % size.map_or(1, |s| s.0) + 1, word))?;
         if value.is_infinite() {
-            return Err(Error::input(format!("line {line}: {word} is no height")));
+            return Err(Error::input(format!("line {line}: {word:.20} is no height")));
         }
         values.push(value);
         if size.is_some_and(|(columns, rows)| values.len() > columns * rows) {

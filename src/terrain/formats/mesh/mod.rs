@@ -21,7 +21,7 @@ const MOST_RAYS: u64 = 4_000_000;
 /// A mesh with a larger fraction of rays that meet no face is refused: a vertex far away makes the grid.
 const MOST_MISSED: f64 = 0.99;
 /// Rays times the triangles that they meet; more would take over about 5 s.
-const MOST_HITS: f64 = 4e7;
+const MOST_HITS: f64 = 2e7;
 /// Meshes from this size on are perhaps in millimeters, m.
 const LARGE: f64 = 100.0;
 
