@@ -122,17 +122,17 @@ fn text_grids_are_read_with_every_separator() {
 
 #[test]
 fn empty_fields_of_text_are_cells_without_data() {
-    let keys = "spacing = 0.1";
+    let keys = "spacing = 0.02";
     // Rows and columns without data, at every side and inside.
     let rows = ["\t\t\t\t\t", "\t1\t2\t3\t\t", "\t\t\t\t\t", "\t4\t5\t6\t\t", "\t7\t8\t9\t\t"];
     let expected: Vec<f64> = [[7, 8, 9], [4, 5, 6], [0; 3], [1, 2, 3], [0; 3]]
         .into_iter()
         .flat_map(|row| [0, row[0], row[1], row[2], 0, 0])
-        .map(|v| if v == 0 { f64::NAN } else { f64::from(v) * 0.1 })
+        .map(|v| if v == 0 { f64::NAN } else { f64::from(v) * 0.01 })
         .collect();
     for separator in ["\t", ",", ";"] {
         let text = format!("{}\n\n", rows.join("\n").replace('\t', separator));
-        let found = ground_of("a.tsv", text.as_bytes(), &format!("{keys}\nheight_scale = 0.1"));
+        let found = ground_of("a.tsv", text.as_bytes(), &format!("{keys}\nheight_scale = 0.01"));
         assert_eq!([found.field.grid().columns, found.field.grid().rows], [6, 5]);
         assert_eq!(found.report.holes_filled, expected.iter().filter(|v| v.is_nan()).count());
         for (raw, v) in found.raw.unwrap().iter().zip(&expected).filter(|(_, v)| !v.is_nan()) {
@@ -140,10 +140,14 @@ fn empty_fields_of_text_are_cells_without_data() {
         }
     }
     // A separator at the end of every row, and of some only.
-    let found = ground_of("a.csv", "1,2,3,4,\n".repeat(4).as_bytes(), keys);
+    let found =
+        ground_of("a.csv", "1,2,3,4,\n".repeat(4).as_bytes(), &format!("{keys}\nheight_scale = 0.01"));
     assert_eq!((found.field.grid().columns, has_note(&found, "end of every row")), (4, true));
     let some = "1,2,3,4,\n".repeat(3) + "1,2,3,4,5\n";
-    assert_eq!(ground_of("a.csv", some.as_bytes(), keys).field.grid().columns, 5);
+    assert_eq!(
+        ground_of("a.csv", some.as_bytes(), &format!("{keys}\nheight_scale = 0.01")).field.grid().columns,
+        5
+    );
     assert_refused("a.csv", b"\xff\xfe1\0,\0", keys, &["text in UTF-16"]);
 }
 
