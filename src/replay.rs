@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-/// Exits with 0 when Python finds the package, without importing it, which would take a second.
+/// Prints "found" when Python finds the package, without importing it, which would take a second.
 const HAS_PACKAGE: &str = "import importlib.util, sys; \
-     found = importlib.util.find_spec('warpgait'); sys.exit(found is None or found.origin is None)";
+     found = importlib.util.find_spec('warpgait'); found is None or found.origin is None or print('found')";
 
 /// The environment variable that names a Python to use.
 const PYTHON_VARIABLE: &str = "WARPGAIT_PYTHON";
@@ -75,8 +75,8 @@ fn candidates() -> Vec<PathBuf> {
 
 fn has_package(python: &Path) -> bool {
     let mut command = command(python);
-    command.args(["-c", HAS_PACKAGE]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    command.status().is_ok_and(|status| status.success())
+    command.args(["-c", HAS_PACKAGE]).stdin(Stdio::null()).stderr(Stdio::null());
+    command.output().is_ok_and(|run| run.stdout.trim_ascii() == b"found")
 }
 
 /// Verdict on a metric or on a whole replay, from best to worst.

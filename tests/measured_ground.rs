@@ -82,6 +82,22 @@ fn a_band_without_data_is_not_crossed() {
 }
 
 #[test]
+fn a_start_in_a_hole_of_the_scan_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    scan(folder.path(), |x, y| (x + 0.64).abs() < 0.16 && y.abs() < 0.5);
+    let text = scenario("").replace("[-0.7, 0.0]", "[-0.3, 0.0]").replace("[0.6, 0.0]", "[0.9, 0.0]");
+    let prepared = |text: &str| {
+        let loaded = load_text("s.toml", text, folder.path(), &[]).unwrap();
+        Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).map(|_| ()).map_err(|e| e.to_string())
+    };
+    let refused = prepared(&text).unwrap_err();
+    for part in ["s.toml:9: start.position: foot ", "in its reach", "contact.on_known_ground"] {
+        assert!(refused.contains(part), "{refused}");
+    }
+    assert_eq!(prepared(&format!("{text}on_known_ground = false\n")), Ok(()));
+}
+
+#[test]
 fn the_check_counts_footholds_in_holes_that_are_wider_than_a_foot() {
     let mut plan = standing();
     let grid = plan.ground.clone();

@@ -193,7 +193,7 @@ fn parts(s: &Subject, remarks: &mut Vec<String>) {
     ));
 }
 
-/// 0 if a row of the history has the violation of the result, its times increase up to the total, and it is as it was written; else
+/// 0 if a row of the history has the violation of the result (which Ipopt sums in another order), its times increase up to the total, and it is as it was written; else
 /// more than that.
 fn history(s: &Subject) -> f64 {
     let (plan, solver) = (s.plan, &s.plan.meta.solver);

@@ -35,7 +35,7 @@ laws! {
     CLAIMS = "claims", "1", Some(0.0), None,
         "number of statements on robot, limits, feet and formulation that differ from what the scenario asks for";
     MAGNITUDE = "magnitude", "1", Some(1e9), None, "the largest number in any member, the history aside";
-    HISTORY = "history", "1", Some(1e-6), None,
+    HISTORY = "history", "1", Some(1e-3), None,
         "a row of the history has the violation of the result, its times increase up to the total, and it is as it was written";
     HORIZON = "horizon", "s", Some(1e-6), None, "difference of the duration, and of that of all phases of a foot, from horizon";
     TERRAIN = "terrain", "mm", Some(1.0), None,

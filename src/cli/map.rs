@@ -52,6 +52,8 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     let mut progress = ProgressLine::new(console.is_quiet());
     progress.show(&Event::Step(Step::Terrain));
     let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    let outputs: Vec<&Path> = arguments.output.iter().map(PathBuf::as_path).collect();
+    ensure_outputs(&outputs, &loaded.paths(&ground.inputs))?;
     let surfaces = Surfaces::of(&loaded.scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
     let surface = &surfaces.posture;
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));

@@ -80,6 +80,8 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     })?;
     // Interrupted before the first iterate: there is no plan to write.
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
+    // Also files that the terrain's file names, which are known only now.
+    ensure_outputs(&outputs, &loaded.paths(&planned.prepared.ground.inputs))?;
     planned.plan.write(&output)?;
     // The plan is written: a drawing that fails does not change that.
     let drawn = plot.as_ref().map_or(Ok(()), |plot| {

@@ -113,8 +113,11 @@ pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         return Ok(solve.finish(first));
     }
     let (how, second) = match (over_edges, steps) {
-        (true, _) => ("with the joints last", Some(solve.joints_last(solver.max_iterations)?)),
-        (false, steps) => ("with a continuation", solve.continuation(steps)?),
+        (true, _) => (
+            "also in a second attempt, which leaves the joints to the end",
+            Some(solve.joints_last(solver.max_iterations)?),
+        ),
+        (false, steps) => ("also with a continuation", solve.continuation(steps)?),
     };
     Ok(solve.finish(match second {
         None => first,

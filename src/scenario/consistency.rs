@@ -90,7 +90,9 @@ pub(super) fn inside(
     robot: Option<&Robot>,
     [x_min, x_max, y_min, y_max]: [f64; 4],
 ) -> Result<()> {
-    let allowed = format!("allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m");
+    let rounded = |v: f64| (v * 1e6).round() / 1e6;
+    let [left, right, near, far] = [x_min, x_max, y_min, y_max].map(rounded);
+    let allowed = format!("allowed: x from {left} to {right}, y from {near} to {far} m");
     let beyond = |[x, y]: [f64; 2]| {
         let along = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
         along(x, x_min, x_max).hypot(along(y, y_min, y_max))

@@ -39,6 +39,11 @@ impl LoadedScenario {
         named.map(|name| self.base_dir.join(name)).chain(self.file.clone()).collect()
     }
 
+    /// Paths of files that were read later, such as those that a terrain file names.
+    pub fn paths(&self, inputs: &[(String, String)]) -> Vec<PathBuf> {
+        inputs.iter().map(|(name, _)| self.base_dir.join(name)).collect()
+    }
+
     /// An input error at a key of the scenario, with file and line.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         self.document.error(key, what)

@@ -67,7 +67,10 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     let layout = spec.layout.unwrap_or(raster.layout);
     let value_type = std::mem::take(&mut raster.value_type);
     let mut inputs = vec![(name.clone(), sha256_hex(&bytes))];
-    inputs.append(&mut raster.inputs);
+    inputs.extend(raster.inputs.drain(..).map(|(path, sum)| {
+        let relative = Path::new(&path).strip_prefix(base_dir).map(|path| path.display().to_string());
+        (relative.unwrap_or(path), sum)
+    }));
 
     let (grid, placing) = placing::grid(&raster, spec, layout, format.name)?;
     let [x_min, x_max, y_min, y_max] = grid.extent();

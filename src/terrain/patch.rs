@@ -30,6 +30,14 @@ impl Patch {
         self.axes().map(|axis| axis[0] * d[0] + axis[1] * d[1])
     }
 
+    /// The point of the rectangle that is nearest to a place, seen from above, m.
+    pub fn nearest(&self, place: [f64; 2]) -> [f64; 2] {
+        let at = self.coordinates(place);
+        let [u, v] = [0, 1].map(|c| at[c].clamp(self.sides[c][0], self.sides[c][1]));
+        let [along, across] = self.axes();
+        std::array::from_fn(|c| self.center[c] + u * along[c] + v * across[c])
+    }
+
     /// The height of the plane and its derivatives.
     pub fn jet(&self, x: f64, y: f64) -> HeightJet {
         let h = self.height + self.slope[0] * (x - self.center[0]) + self.slope[1] * (y - self.center[1]);
@@ -58,6 +66,12 @@ impl Patch {
 mod tests {
     use super::*;
 
+    /// A place beyond the corner at (u, v) along both sides.
+    fn x_or_y(patch: &Patch, u: f64, v: f64, c: usize) -> f64 {
+        let [along, across] = patch.axes();
+        patch.center[c] + 2.0 * (u * along[c] + v * across[c])
+    }
+
     #[test]
     fn corners_lie_on_the_plane_at_the_ends_of_the_sides() {
         let patch = Patch {
@@ -71,6 +85,9 @@ mod tests {
         for (corner, sides) in corners.iter().zip([[-0.1, -0.05], [0.2, -0.05], [0.2, 0.15], [-0.1, 0.15]]) {
             let [x, y, z] = *corner;
             let [u, v] = patch.coordinates([x, y]);
+            let beyond = [0, 1].map(|c| x_or_y(&patch, u, v, c));
+            let found = patch.nearest(beyond);
+            assert!((found[0] - x).hypot(found[1] - y) < 1e-12);
             assert!((u - sides[0]).abs() < 1e-12 && (v - sides[1]).abs() < 1e-12);
             assert!((z - (0.3 + 0.1 * (x - 1.0) - 0.2 * (y + 2.0))).abs() < 1e-12);
             let n = patch.normal();

@@ -75,11 +75,15 @@ def test_arrays_are_written_with_spacing_place_and_layout(tmp_path: Path) -> Non
         np.testing.assert_allclose(ground["origin"], corner, atol=1e-12)
         assert str(ground["layout"]) == layout and ground["spacing"] == 0.02
         np.testing.assert_array_equal(ground["heights"], heights())
+    write_terrain(path, np.full((5, 5), 200, dtype=np.int16), spacing=0.1, height_scale=0.005)
+    np.testing.assert_allclose(np.load(path)["heights"], 1.0)
     for array, options, what in (
         (np.zeros(9), {}, "two dimensions"),
         (np.zeros((3, 9)), {}, "at least 4"),
         (np.full((5, 5), np.inf), {}, "finite"),
         (np.zeros((5, 5), dtype=complex), {}, "numbers"),
+        (np.zeros((5, 5), dtype=np.int16), {}, "height_scale is missing"),
+        (np.zeros((5, 5)), {"height_scale": 0.0}, "other than 0"),
         (np.zeros((5, 5)), {"layout": "xy"}, "picture, y-up, x-y, grid-map"),
         (np.zeros((5, 5)), {"spacing": 0.0}, "from 0.001"),
         (np.zeros((5, 5)), {"origin": (0.0, np.nan)}, "x and y"),

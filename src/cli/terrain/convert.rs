@@ -23,7 +23,7 @@ const WHITE: f64 = 65535.0;
 
 const EXAMPLES: &str = "\
 Examples:
-  warpgait terrain convert isaac.npy ground.npz --spacing 0.1 --layout x-y
+  warpgait terrain convert isaac.npy ground.npz --spacing 0.1 --height-scale 0.005 --layout x-y
   warpgait terrain convert tiles.stl tiles.npz --spacing 0.02
   warpgait terrain convert hill.toml hill.asc            the ground of a scenario
   warpgait terrain convert scan.npz scan.png             16 bit; prints the scale

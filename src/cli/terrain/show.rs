@@ -18,8 +18,8 @@ use crate::{Error, Result};
 const EXAMPLES: &str = "\
 Examples:
   warpgait terrain show hill.toml                        the ground of a scenario, with start and goal
-  warpgait terrain show scan.npy --spacing 0.04          a file of heights: hill.terrain.svg shows which way it lies
-  warpgait terrain show isaac.npy --spacing 0.1 --layout x-y
+  warpgait terrain show scan.npy --spacing 0.04          a file of heights: scan.terrain.svg shows which way it lies
+  warpgait terrain show isaac.npy --spacing 0.1 --height-scale 0.005 --layout x-y
   warpgait terrain show map.png --spacing 0.05 --height-scale 1.25 --no-data 0
   warpgait terrain show tiles.stl --spacing 0.02 -o tiles.svg --json
 
@@ -106,6 +106,16 @@ fn ends(read: &Read) -> Option<[([f64; 2], f64); 2]> {
     read.has_ends.then(|| [start.position, goal.position].map(with_height))
 }
 
+/// Whether nothing was measured at a place.
+fn is_unknown(read: &Read, [x, y]: [f64; 2]) -> bool {
+    let grid = read.ground.field.grid();
+    let at = |v: f64, c: usize, count: usize| {
+        (((v - grid.origin[c]) / grid.spacing[c]).round().max(0.0) as usize).min(count - 1)
+    };
+    let cell = at(y, 1, grid.rows) * grid.columns + at(x, 0, grid.columns);
+    read.ground.unknown.as_ref().is_some_and(|unknown| unknown[cell])
+}
+
 /// What a user should see before planning, in lines.
 fn facts(read: &Read) -> Vec<String> {
     let report = &read.ground.report;
@@ -154,7 +164,9 @@ fn facts(read: &Read) -> Vec<String> {
     }
     if let Some(ends) = ends(read) {
         for (name, ([x, y], z)) in ["Start:", "Goal:"].into_iter().zip(ends) {
-            lines.push(format!("{name:<10} x = {x:.3}, y = {y:.3}, on ground at z = {z:.3} m"));
+            let z = (1e3 * z).round() / 1e3 + 0.0; // no -0.000
+            let guess = if is_unknown(read, [x, y]) { " (no data there: a guess)" } else { "" };
+            lines.push(format!("{name:<10} x = {x:.3}, y = {y:.3}, on ground at z = {z:.3} m{guess}"));
         }
     }
     lines

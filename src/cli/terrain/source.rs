@@ -132,5 +132,6 @@ fn read(loaded: LoadedScenario, output: Option<&Path>, has_ends: bool) -> Result
         _ => None,
     };
     let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    ensure_outputs(output.as_slice(), &loaded.paths(&ground.inputs))?;
     Ok(Read { loaded, ground, heightmap, has_ends })
 }

@@ -134,7 +134,7 @@ fn values(document: &Document, field: Node, input: &Input) -> Result<Raster> {
         } else {
             hfield::values(&bytes)?
         };
-        raster.inputs.push((file.to_owned(), sha256_hex(&bytes)));
+        raster.inputs.push((path.to_string_lossy().into_owned(), sha256_hex(&bytes)));
         return Ok(raster);
     }
     let count = |attribute: &str| {

@@ -20,12 +20,13 @@ def write_terrain(
     heights: npt.ArrayLike,
     *,
     spacing: float,
+    height_scale: float | None = None,
     layout: str = "picture",
     origin: tuple[float, float] = (0.0, 0.0),
 ) -> None:
     """Write a ground that a scenario can name: `kind = "heightmap"`, `file = "NAME.npz"`.
 
-    `heights` is two-dimensional, in m, NaN where there is no data. `layout` says which way its indices run, as `terrain.layout` does:
+    `heights` is two-dimensional, NaN where there is no data; floats in m, or integers of which one unit is `height_scale` m. `layout` says which way its indices run, as `terrain.layout` does:
     picture (a[0, 0] at the least x and the largest y), y-up (a[y, x]), x-y (a[x, y]) or grid-map. `origin` is x, y of the center, m.
     Raises `InputError`.
     """
@@ -36,6 +37,11 @@ def write_terrain(
         )
     if array.dtype.kind not in "fiu":
         raise InputError(f"heights of type {array.dtype}: expected numbers, in m")
+    if array.dtype.kind in "iu" and height_scale is None:
+        raise InputError("heights are integers: height_scale is missing, the height of one unit in m (1.0 if they are in m)")
+    scale = 1.0 if height_scale is None else float(height_scale)
+    if not np.isfinite(scale) or scale == 0.0:
+        raise InputError(f"height_scale {height_scale}: expected a number other than 0, m")
     if np.isinf(array).any():
         raise InputError("heights must be finite, or NaN where there is no data")
     if layout not in LAYOUTS:
@@ -47,5 +53,5 @@ def write_terrain(
     if corner.shape != (2,) or not np.isfinite(corner).all():
         raise InputError(f"origin {origin}: expected x and y of the center, m")
     content = io.BytesIO()
-    np.savez_compressed(content, heights=array.astype(float), spacing=float(spacing), origin=corner, layout=np.array(layout))
+    np.savez_compressed(content, heights=array.astype(float) * scale, spacing=float(spacing), origin=corner, layout=np.array(layout))
     write_bytes(Path(path), content.getvalue())

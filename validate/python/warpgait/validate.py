@@ -70,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--still", action="store_true", help="write NAME.png as well: the whole walk in one picture")
     parser.add_argument("--json", action="store_true", help="print the report as JSON and nothing else")
     parser.add_argument("--no-files", action="store_true", help="write no files, only print the verdict")
-    parser.add_argument("--quiet", action="store_true", help="no progress on standard error")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress on standard error")
     world = parser.add_argument_group("a world that differs from the plan's; the controller does not know it")
     world.add_argument("--friction", type=float, help="friction coefficient of the ground (default: the plan's)")
     world.add_argument(

@@ -78,7 +78,7 @@ fn heights(triangles: Triangles, input: &Input) -> Result<Raster> {
     check_size(columns, rows).map_err(|e| refuse(&e))?;
     if columns * rows > MOST_RAYS {
         return Err(refuse(&format!(
-            "{columns} x {rows} rays are too many: at most {MOST_RAYS} in all; give a larger one"
+            "{columns} x {rows} rays are too many: at most {MOST_RAYS} in all; give a larger one, or scale the mesh to meters if it is in millimeters"
         )));
     }
     let grid = rays::Rays {
