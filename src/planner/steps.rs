@@ -11,7 +11,7 @@ use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Spaces};
 
 /// Lengths of a cycle that are tried besides the usual one, as fractions of it.
-const SHORTER_CYCLES: [f64; 3] = [0.9, 0.8, 0.7];
+const SHORTER_CYCLES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
 /// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
 const MORE_STEPS: f64 = 0.1;
 
