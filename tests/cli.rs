@@ -170,7 +170,7 @@ fn validate_runs_python() {
     let python = folder.path().join("python");
     let validate = |arguments: &[&str]| with_python(folder.path(), &python, arguments);
     // Poses as Python: it has the package, prints its arguments, and judges the plan not trackable.
-    script(&python, "[ \"$2\" = -c ] && exit 0\necho \"$@\"\nexit 1");
+    script(&python, "[ \"$2\" = -c ] && echo found && exit 0\necho \"$@\"\nexit 1");
     let (code, out, _) = validate(&["validate", "a.plan.npz", "--friction", "0.5"]);
     assert_eq!((code, out.trim()), (1, "-P -m warpgait.validate a.plan.npz --friction 0.5"));
     let (_, out, _) = validate(&["--json", "validate", "a.plan.npz"]);
@@ -180,7 +180,7 @@ fn validate_runs_python() {
     assert_eq!(out.trim(), "-P -m warpgait.validate a.plan.npz --json");
 
     // A Python that crashes is neither "not trackable" nor an interruption.
-    script(&python, "[ \"$2\" = -c ] && exit 0\nkill -s SEGV $$");
+    script(&python, "[ \"$2\" = -c ] && echo found && exit 0\nkill -s SEGV $$");
     let (code, _, err) = validate(&["validate", "a.plan.npz"]);
     assert_eq!(code, 2, "{err}");
     assert!(err.contains("crashed"), "{err}");

@@ -86,7 +86,7 @@ fn a_plan_with_switches_between_samples_is_read_back() {
 fn bounds_that_cannot_hold_are_refused_before_anything_is_computed() {
     let scenario = |gait: &str| {
         format!(
-            "schema = 1\nhorizon = 4.0\n[terrain]\nkind = \"flat\"\n[start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.3, 0.0]\n\
+            "schema = 1\nhorizon = 4.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\n[start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.3, 0.0]\n\
              [gait]\noptimize_durations = true\n{gait}\n"
         )
     };

@@ -9,8 +9,8 @@ use serde_json::json;
 use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
 use super::progress_line::ProgressLine;
-use crate::files::ensure_outputs;
 use crate::files::npz::NpzWriter;
+use crate::files::{ensure_no_inputs, ensure_outputs};
 use crate::heightfield::Heightfield;
 use crate::ipopt::InGoodOrder;
 use crate::pipeline::{self, BuiltMap, Event, Step};
@@ -53,7 +53,7 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     progress.show(&Event::Step(Step::Terrain));
     let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     let outputs: Vec<&Path> = arguments.output.iter().map(PathBuf::as_path).collect();
-    ensure_outputs(&outputs, &loaded.paths(&ground.inputs))?;
+    ensure_no_inputs(&outputs, &loaded.paths(&ground.inputs))?;
     let surfaces = Surfaces::of(&loaded.scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
     let surface = &surfaces.posture;
     ground.report.notes.iter().for_each(|note| progress.note(&format!("terrain: {note}")));

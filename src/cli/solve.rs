@@ -11,7 +11,7 @@ use super::console::Console;
 use super::ending::{Ending, listen_for_ctrl_c};
 use super::figures::figures;
 use super::progress_line::ProgressLine;
-use crate::files::{ensure_outputs, write_atomically};
+use crate::files::{ensure_no_inputs, ensure_outputs, write_atomically};
 use crate::ipopt::InGoodOrder;
 use crate::pipeline::{self, Event, Planned, Step};
 use crate::planner::derivatives::DerivativeError;
@@ -81,7 +81,7 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
     // Interrupted before the first iterate: there is no plan to write.
     let Some(planned) = planned else { return Ok(Ending::Interrupted) };
     // Also files that the terrain's file names, which are known only now.
-    ensure_outputs(&outputs, &loaded.paths(&planned.prepared.ground.inputs))?;
+    ensure_no_inputs(&outputs, &loaded.paths(&planned.prepared.ground.inputs))?;
     planned.plan.write(&output)?;
     // The plan is written: a drawing that fails does not change that.
     let drawn = plot.as_ref().map_or(Ok(()), |plot| {

@@ -6,4 +6,4 @@ pub mod npz;
 mod output;
 
 pub use input::{MAX_FILE, MAX_TEXT, read, read_text};
-pub use output::{Pending, ensure_outputs, open_for_process, write_atomically};
+pub use output::{Pending, ensure_no_inputs, ensure_outputs, open_for_process, write_atomically};

@@ -60,11 +60,7 @@ pub fn ensure_outputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
         let target = Target::of(output)?;
         let place = target.place();
         if let Some(file) = place.file {
-            let same = |input: &&PathBuf| fs::metadata(input).is_ok_and(|about| identity(&about) == file);
-            if let Some(input) = inputs.iter().find(same) {
-                let what = format!("it is {}, which this command reads; name another file", input.display());
-                return Err(refusal(output, &what));
-            }
+            ensure_no_input(output, file, inputs)?;
         }
         if let Some((_, other)) = places.iter().find(|(other, _)| other.is(&place)) {
             let what = format!("this command writes {} there as well; name another file", other.display());
@@ -74,6 +70,30 @@ pub fn ensure_outputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
         drop(Pending::new(output, target)?);
     }
     Ok(())
+}
+
+/// Refuses outputs that are one of these inputs, which were not known when the command began.
+///
+/// # Errors
+/// Which output is refused.
+pub fn ensure_no_inputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
+    for output in outputs {
+        if let Ok(about) = fs::metadata(output) {
+            ensure_no_input(output, identity(&about), inputs)?;
+        }
+    }
+    Ok(())
+}
+
+fn ensure_no_input(output: &Path, file: (u64, u64), inputs: &[PathBuf]) -> Result<()> {
+    let same = |input: &&PathBuf| fs::metadata(input).is_ok_and(|about| identity(&about) == file);
+    match inputs.iter().find(same) {
+        Some(input) => {
+            let what = format!("it is {}, which this command reads; name another file", input.display());
+            Err(refusal(output, &what))
+        }
+        None => Ok(()),
+    }
 }
 
 /// A file under its temporary name, removed unless it is committed.

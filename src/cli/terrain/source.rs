@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::files::ensure_outputs;
+use crate::files::{ensure_no_inputs, ensure_outputs};
 use crate::scenario::{self, LoadedScenario, TerrainSpec};
 use crate::terrain::{self, Ground, Heightmap};
 use crate::{Error, Result};
@@ -132,6 +132,6 @@ fn read(loaded: LoadedScenario, output: Option<&Path>, has_ends: bool) -> Result
         _ => None,
     };
     let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
-    ensure_outputs(output.as_slice(), &loaded.paths(&ground.inputs))?;
+    ensure_no_inputs(output.as_slice(), &loaded.paths(&ground.inputs))?;
     Ok(Read { loaded, ground, heightmap, has_ends })
 }
