@@ -1,5 +1,6 @@
 //! One NumPy array (`.npy`, versions 1 to 3): a signature, a Python dictionary with type, order and shape, and the elements.
 
+use crate::visible::visible;
 use std::io::{ErrorKind, Read};
 
 /// The first bytes of every `.npy` file.
@@ -58,7 +59,7 @@ impl Header {
         fill(file, &mut text)?;
         // Version 1 is Latin-1, which differs from UTF-8 only in the names of a record's fields.
         let text = String::from_utf8_lossy(&text);
-        parse(&text).ok_or_else(|| format!("its header is {}", cut(text.trim())))
+        parse(&text).ok_or_else(|| format!("its header is {}", visible(&cut(text.trim()))))
     }
 
     /// The bytes before the elements: version 1, padded as NumPy does it.
