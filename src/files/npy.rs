@@ -1,7 +1,8 @@
 //! One NumPy array (`.npy`, versions 1 to 3): a signature, a Python dictionary with type, order and shape, and the elements.
 
-use crate::visible::visible;
 use std::io::{ErrorKind, Read};
+
+use crate::visible::visible;
 
 /// The first bytes of every `.npy` file.
 pub const SIGNATURE: &[u8] = b"\x93NUMPY";
