@@ -138,8 +138,20 @@ fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
         [seconds, solver.seconds.map, solver.seconds.evaluation, solver.seconds.linear_solver]
             .map(report::number);
     let verdict = if motion.solved { "Solved" } else { "NOT SOLVED" };
+    let failing = planned.check.rows.iter().find(|row| !row.passed);
+    // The laws hold at the samples of the solver; what fails, fails between them.
+    let advice = match failing {
+        Some(row) if motion.solved => format!(
+            "\nThe first that fails: {} is {} {}, allowed {}. A smaller time_step often helps.",
+            row.name,
+            report::number(row.value),
+            row.unit,
+            report::number(row.limit)
+        ),
+        _ => String::new(),
+    };
     format!(
-        "{verdict}: {} after {} iterations; {}.\n\
+        "{verdict}: {} after {} iterations; {}.{advice}\n\
          {total} s in total: map {map} s, evaluation {evaluation} s, linear solver {linear} s.\n\
          Written: {}",
         motion.status,

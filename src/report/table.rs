@@ -91,6 +91,7 @@ pub fn check_table(report: &CheckReport, color: bool) -> String {
 pub fn check_counts(rows: &[CheckRow]) -> String {
     match rows.iter().filter(|row| !row.passed).count() {
         0 => format!("all {} checks hold", rows.len()),
+        1 => format!("1 of {} checks fails", rows.len()),
         failed => format!("{failed} of {} checks fail", rows.len()),
     }
 }

@@ -159,10 +159,12 @@ fn posture(contact: &ContactGround, heights: &[f64], deviation: f64) -> Result<V
         }
     }
     fill_holes(grid.columns, &mut filled).map_err(|_| {
-        crate::Error::key(
-            "terrain",
-            "there is no place where a foot can stand: the ground is too rough or too steep everywhere (see contact.footholds)",
-        )
+        let why = if contact.has_holes() {
+            "too rough, too steep, or without data everywhere (see contact.footholds, contact.on_known_ground)"
+        } else {
+            "too rough or too steep everywhere (see contact.footholds)"
+        };
+        crate::Error::key("terrain", format!("there is no place where a foot can stand: the ground is {why}"))
     })?;
     Ok(smooth(grid.columns, &filled, &holes, deviation / grid.spacing[0]))
 }

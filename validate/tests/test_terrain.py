@@ -77,6 +77,9 @@ def test_arrays_are_written_with_spacing_place_and_layout(tmp_path: Path) -> Non
         np.testing.assert_array_equal(ground["heights"], heights())
     write_terrain(path, np.full((5, 5), 200, dtype=np.int16), spacing=0.1, height_scale=0.005)
     np.testing.assert_allclose(np.load(path)["heights"], 1.0)
+    masked = np.ma.masked_equal(np.array([[-9999.0, 1.0, 2.0, 3.0]] * 4), -9999.0)
+    write_terrain(path, masked, spacing=0.1)
+    assert np.isnan(np.load(path)["heights"][:, 0]).all()
     for array, options, what in (
         (np.zeros(9), {}, "two dimensions"),
         (np.zeros((3, 9)), {}, "at least 4"),
@@ -87,6 +90,7 @@ def test_arrays_are_written_with_spacing_place_and_layout(tmp_path: Path) -> Non
         (np.zeros((5, 5)), {"layout": "xy"}, "picture, y-up, x-y, grid-map"),
         (np.zeros((5, 5)), {"spacing": 0.0}, "from 0.001"),
         (np.zeros((5, 5)), {"origin": (0.0, np.nan)}, "x and y"),
+        (np.zeros((5, 5)), {"origin": (0.0, 0.0, 0.0)}, "x and y"),
     ):
         with pytest.raises(InputError, match=what):
             write_terrain(path, array, **{"spacing": 0.02, **options})  # type: ignore[arg-type]

@@ -26,10 +26,12 @@ def write_terrain(
 ) -> None:
     """Write a ground that a scenario can name: `kind = "heightmap"`, `file = "NAME.npz"`.
 
-    `heights` is two-dimensional, NaN where there is no data; floats in m, or integers of which one unit is `height_scale` m. `layout` says which way its indices run, as `terrain.layout` does:
+    `heights` is two-dimensional, NaN or masked where there is no data; floats in m, or integers of which one unit is `height_scale` m. `layout` says which way its indices run, as `terrain.layout` does:
     picture (a[0, 0] at the least x and the largest y), y-up (a[y, x]), x-y (a[x, y]) or grid-map. `origin` is x, y of the center, m.
     Raises `InputError`.
     """
+    # Masked elements have no data.
+    masked = np.ma.getmaskarray(heights) if isinstance(heights, np.ma.MaskedArray) else None
     array = np.asarray(heights)
     if array.ndim != 2 or min(array.shape) < 4 or array.size > _MOST_CELLS:
         raise InputError(
@@ -42,16 +44,20 @@ def write_terrain(
     scale = 1.0 if height_scale is None else float(height_scale)
     if not np.isfinite(scale) or scale == 0.0:
         raise InputError(f"height_scale {height_scale}: expected a number other than 0, m")
-    if np.isinf(array).any():
+    if np.isinf(array if masked is None else array[~masked]).any():
         raise InputError("heights must be finite, or NaN where there is no data")
     if layout not in LAYOUTS:
         raise InputError(f'layout "{layout}": expected one of {", ".join(LAYOUTS)}')
     if not 0.001 <= spacing <= 10.0:
         raise InputError(f"spacing {spacing}: expected a number from 0.001 to 10, m")
     columns, rows = array.shape if layout in ("x-y", "grid-map") else array.shape[::-1]
-    corner = np.asarray(origin, dtype=float) - 0.5 * spacing * (np.array([columns, rows]) - 1)
-    if corner.shape != (2,) or not np.isfinite(corner).all():
+    center = np.asarray(origin, dtype=float)
+    if center.shape != (2,) or not np.isfinite(center).all():
         raise InputError(f"origin {origin}: expected x and y of the center, m")
+    corner = center - 0.5 * spacing * (np.array([columns, rows]) - 1)
+    measured = array.astype(float) * scale
+    if masked is not None:
+        measured[masked] = np.nan
     content = io.BytesIO()
-    np.savez_compressed(content, heights=array.astype(float) * scale, spacing=float(spacing), origin=corner, layout=np.array(layout))
+    np.savez_compressed(content, heights=measured, spacing=float(spacing), origin=corner, layout=np.array(layout))
     write_bytes(Path(path), content.getvalue())
