@@ -1,4 +1,5 @@
-//! Footholds against what was measured: none where a scan has no data, none where smoothing moved the ground.
+//! Footholds against what was measured: none where a scan has no data, none where smoothing moved the ground. What counts as a hole
+//! is computed for the check alone, so that an error in the planner's rule cannot hide itself.
 
 use super::ground::PlanGround;
 use super::laws;
@@ -14,8 +15,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
         for (n, e, [x, y]) in footholds(s) {
             if is_in_hole(s, unknown, x, y) {
                 count += 1;
-                let where_first = first.sample.is_none_or(|found| n < found);
-                if where_first {
+                if first.sample.is_none_or(|found| n < found) {
                     first = Worst { value: 0.0, sample: Some(n), foot: Some(e) };
                 }
             }
@@ -55,7 +55,7 @@ fn footholds(s: &Subject) -> Vec<(usize, usize, [f64; 2])> {
 fn is_in_hole(s: &Subject, unknown: &[bool], x: f64, y: f64) -> bool {
     let grid = &s.plan.ground;
     let counts = [grid.columns, grid.rows];
-    let radius = s.plan.meta.robot.foot_radius;
+    let radius = s.robot.foot_radius;
     let offsets: Vec<[isize; 2]> = {
         let reach = [0, 1].map(|c| (radius / grid.spacing[c] + ROUNDING) as isize);
         let within = |u: isize, v: isize| {

@@ -80,6 +80,15 @@ impl Grid {
         Ok(Self { origin: [x_min, y_min], spacing, columns, rows })
     }
 
+    /// The node nearest to a place, `row * columns + column`; none outside the grid.
+    pub fn nearest(&self, place: [f64; 2]) -> Option<usize> {
+        let at = |axis: usize, count: usize| {
+            let k = ((place[axis] - self.origin[axis]) / self.spacing[axis]).round();
+            (k >= 0.0 && k < count as f64).then_some(k as usize)
+        };
+        Some(at(1, self.rows)? * self.columns + at(0, self.columns)?)
+    }
+
     /// x of a column, m.
     pub fn x(&self, column: usize) -> f64 {
         self.origin[0] + self.spacing[0] * column as f64

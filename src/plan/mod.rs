@@ -10,6 +10,7 @@ pub use read::PLAN_SCHEMA;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::sha256_hex;
+use crate::heightfield::Grid;
 use crate::planner::Seconds;
 use crate::robot::Box3;
 use crate::scenario::Formulation;
@@ -120,6 +121,13 @@ pub struct GroundGrid {
     pub raw: Option<Vec<f64>>,
     /// The same grid: where nothing was measured and the heights are a guess; none if there is no such place.
     pub unknown: Option<Vec<bool>>,
+}
+
+impl GroundGrid {
+    /// Where the samples are.
+    pub fn grid(&self) -> Grid {
+        Grid { origin: self.origin, spacing: self.spacing, columns: self.columns, rows: self.rows }
+    }
 }
 
 /// The `meta` member of a plan.

@@ -29,15 +29,19 @@ impl Steps {
     /// better, such as on a staircase with short treads.
     ///
     /// # Errors
-    /// Those of the gait, for a goal out of range, and, if no number of steps will do, what is wrong with the usual number: which foot finds nothing to stand on,
-    /// where and when.
+    /// Those of the gait; for a goal out of range; and, if no number of steps will do, what is wrong with the usual number: which foot
+    /// finds nothing to stand on, where and when.
     pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
         let usual = Gait::of(scenario, robot)?;
-        let mut possible = vec![usual.clone()];
-        if surfaces.have_edges() {
-            let quicker = |factor: &f64| Gait::with_more_steps(scenario, robot, *factor)?.ok();
-            possible.extend(SHORTER_CYCLES.iter().filter_map(quicker));
-        }
+        let shorter: Vec<(f64, Gait)> = match surfaces.have_edges() {
+            true => SHORTER_CYCLES
+                .iter()
+                .map_while(|&factor| Some((factor, Gait::with_more_steps(scenario, robot, factor)?.ok()?)))
+                .collect(),
+            false => Vec::new(),
+        };
+        let possible: Vec<&Gait> =
+            std::iter::once(&usual).chain(shorter.iter().map(|(_, gait)| gait)).collect();
         ensure_within_range(scenario, robot, &possible)?;
         let Some(contact) = &surfaces.contact else { return Ok(Self { gait: usual, patches: Vec::new() }) };
         // In ambient space, so that all formulations get the same patches.
@@ -50,8 +54,7 @@ impl Steps {
             Ok((cost / count as f64, gait, cells))
         };
         let mut best = with(usual);
-        for factor in SHORTER_CYCLES {
-            let Some(Ok(gait)) = Gait::with_more_steps(scenario, robot, factor) else { break };
+        for (factor, gait) in shorter {
             if let Ok((cost, gait, cells)) = with(gait) {
                 let cost = cost + MORE_STEPS * (1.0 - factor);
                 if best.as_ref().map_or(true, |(least, ..)| cost < *least) {

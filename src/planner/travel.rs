@@ -16,7 +16,7 @@ const LONGEST: f64 = 600.0;
 ///
 /// # Errors
 /// [`Error::Key`], with a horizon that should do, if one is found.
-pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[Gait]) -> Result<()> {
+pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[&Gait]) -> Result<()> {
     if scenario.gait.optimize_durations {
         return Ok(());
     }
@@ -104,7 +104,7 @@ mod tests {
     fn refusal(horizon: f64, goal: f64, gait: &str) -> Option<String> {
         let loaded = loaded(horizon, goal, gait);
         let gait = Gait::of(&loaded.scenario, &loaded.robot).expect("a gait");
-        ensure_within_range(&loaded.scenario, &loaded.robot, &[gait]).err().map(|e| e.to_string())
+        ensure_within_range(&loaded.scenario, &loaded.robot, &[&gait]).err().map(|e| e.to_string())
     }
 
     #[test]

@@ -106,7 +106,8 @@ pub(super) fn height(ground: &GroundGrid, x: f64, y: f64) -> Option<f64> {
 /// Ground without data within a frame.
 pub(super) fn draw_unknown(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
     if let Some(unknown) = &ground.unknown {
-        let is_unknown = |place| nearest(ground, place).is_some_and(|cell| unknown[cell]);
+        let grid = ground.grid();
+        let is_unknown = |place| grid.nearest(place).is_some_and(|cell| unknown[cell]);
         let cells: Vec<bool> = places(axes).map(is_unknown).collect();
         svg.rects(runs(axes.frame, 0.0, |cell| cells[cell]), UNKNOWN);
     }
@@ -116,15 +117,6 @@ pub(super) fn draw_unknown(svg: &mut Svg, axes: &Axes, ground: &GroundGrid) {
 pub(super) fn unknown_sample(svg: &mut Svg, frame: [f64; 4]) {
     svg.rect(frame, "fill=\"#f3eede\"");
     svg.rect(frame, &format!("{UNKNOWN} stroke=\"#888\" stroke-width=\"0.6\""));
-}
-
-/// The sample nearest to a place; none outside the grid.
-fn nearest(ground: &GroundGrid, place: [f64; 2]) -> Option<usize> {
-    let at = |c: usize, count: usize| {
-        let k = ((place[c] - ground.origin[c]) / ground.spacing[c]).round();
-        (k >= 0.0 && k < count as f64).then_some(k as usize)
-    };
-    Some(at(1, ground.rows)? * ground.columns + at(0, ground.columns)?)
 }
 
 /// The centers of the `RASTER` × `RASTER` cells of a frame, row by row from the top.

@@ -59,7 +59,8 @@ impl LoadedScenario {
         consistency::inside(&self.document, &self.scenario, None, extent)
     }
 
-    /// Refuses a start or goal at which the base or a foot is outside the ground. For terrain files, whose extent is known only once they are read.
+    /// Refuses a start or goal at which the base or a foot is outside the ground. For terrain files, whose extent is known only once
+    /// they are read.
     pub fn ensure_inside(&self, extent: [f64; 4]) -> Result<()> {
         consistency::inside(&self.document, &self.scenario, Some(&self.robot), extent)
     }

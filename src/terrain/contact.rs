@@ -120,7 +120,7 @@ impl ContactGround {
 
     /// The cell nearest to a place, if a foot can stand there.
     pub fn steppable_cell(&self, place: [f64; 2]) -> Option<usize> {
-        self.cell_at(place).filter(|&cell| self.steppable[cell])
+        self.grid.nearest(place).filter(|&cell| self.steppable[cell])
     }
 
     /// Whether a foot can stand at the cell nearest to a place.
@@ -143,7 +143,7 @@ impl ContactGround {
         (0..=steps)
             .filter_map(|n| {
                 let u = n as f64 / steps as f64;
-                self.cell_at(std::array::from_fn(|c| from[c] + u * (to[c] - from[c])))
+                self.grid.nearest(std::array::from_fn(|c| from[c] + u * (to[c] - from[c])))
             })
             .map(|cell| self.heights[cell])
             .fold(f64::NEG_INFINITY, f64::max)
@@ -168,14 +168,6 @@ impl ContactGround {
         let (columns, rows) = (range(0, self.grid.columns)?, range(1, self.grid.rows)?);
         let width = self.grid.columns;
         Some(rows.flat_map(move |row| columns.clone().map(move |column| row * width + column)))
-    }
-
-    fn cell_at(&self, place: [f64; 2]) -> Option<usize> {
-        let at = |axis: usize, count: usize| {
-            let k = ((place[axis] - self.grid.origin[axis]) / self.grid.spacing[axis]).round();
-            (k >= 0.0 && k < count as f64).then_some(k as usize)
-        };
-        Some(at(1, self.grid.rows)? * self.grid.columns + at(0, self.grid.columns)?)
     }
 
     /// The largest of some rectangles around a steppable cell within which a foot can stand on the same plane.
@@ -325,7 +317,7 @@ mod tests {
         assert!(!ground(|x, _| 0.65 * x).is_steppable([0.0, 0.0]));
         let slope = ground(|x, y| 0.5 * x - 0.2 * y);
         assert!(slope.is_steppable([0.0, 0.0]));
-        let plane = slope.planes[slope.cell_at([0.2, 0.1]).expect("a cell")];
+        let plane = slope.planes[slope.grid.nearest([0.2, 0.1]).expect("a cell")];
         assert!((plane[0] - 0.08).abs() < 1e-12 && (plane[1] - 0.5).abs() < 1e-12);
         assert!(!ground(|x, _| 0.02 * (70.0 * x).sin()).is_steppable([0.0, 0.0]));
     }

@@ -93,23 +93,23 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     Ok(Heightmap { scan, source, inputs })
 }
 
-/// The ground of a heightmap.
+/// The ground of a heightmap that was read.
 ///
 /// # Errors
-/// [`Error::Key`] for files that cannot be read, decoded, or turned into a heightfield.
+/// [`Error::Key`] for heights that cannot be turned into a heightfield.
 pub fn ground(
     kind: &'static str,
     spec: &HeightmapSpec,
     footholds: Footholds,
-    base_dir: &Path,
+    heightmap: &Heightmap,
 ) -> Result<Ground> {
-    let Heightmap { scan, source, inputs } = read(spec, base_dir)?;
+    let Heightmap { scan, source, inputs } = heightmap;
     if let Some(what) = spec.excess_of_smoothing(scan.grid.spacing[0]) {
         return Err(Error::key("terrain.smoothing", what));
     }
     let mut ground = scan::ground(kind, spec, footholds, scan)?;
-    ground.inputs.extend(inputs);
-    ground.report.notes.splice(0..0, source.notes);
+    ground.inputs.extend(inputs.iter().cloned());
+    ground.report.notes.splice(0..0, source.notes.iter().cloned());
     Ok(ground)
 }
 

@@ -31,7 +31,7 @@ use crate::scenario::{Scenario, TerrainSpec};
 pub use contact::{ContactGround, FootNeeds};
 use formula::Formula;
 pub use ground::{Ground, GroundReport};
-pub use heightmap::{Heightmap, Source, read as read_heightmap};
+pub use heightmap::{Heightmap, Source};
 pub use patch::Patch;
 pub use scan::Scan;
 pub use surfaces::Surfaces;
@@ -43,10 +43,22 @@ pub use surfaces::Surfaces;
 /// [`Error::Key`](crate::Error::Key) for files that cannot be read or decoded, expressions that fail, and heights that are not
 /// finite. Says what, where, and what is allowed.
 pub fn build(scenario: &Scenario, base_dir: &Path) -> Result<Ground> {
+    build_with_source(scenario, base_dir).map(|(ground, _)| ground)
+}
+
+/// The same, with the heights as measured and what their file was taken for; none for a terrain that is a function.
+///
+/// # Errors
+/// Those of [`build`].
+pub fn build_with_source(scenario: &Scenario, base_dir: &Path) -> Result<(Ground, Option<Heightmap>)> {
     let kind = scenario.terrain.kind();
     match Shape::of(&scenario.terrain)? {
-        Shape::Function(domain, h) => function::ground(kind, domain, h),
-        Shape::Heightmap(spec) => heightmap::ground(kind, spec, scenario.footholds(), base_dir),
+        Shape::Function(domain, h) => Ok((function::ground(kind, domain, h)?, None)),
+        Shape::Heightmap(spec) => {
+            let heightmap = heightmap::read(spec, base_dir)?;
+            let ground = heightmap::ground(kind, spec, scenario.footholds(), &heightmap)?;
+            Ok((ground, Some(heightmap)))
+        }
     }
 }
 

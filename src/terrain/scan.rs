@@ -31,10 +31,11 @@ pub struct Scan {
 ///
 /// # Errors
 /// [`Error::Key`] if nothing was measured, the heights differ too much or are too large, or the extent exceeds the scan.
-pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, scan: Scan) -> Result<Ground> {
+pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, scan: &Scan) -> Result<Ground> {
     let refuse =
         |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{:?}: {what}", spec.file));
     let Scan { grid, heights: measured } = scan;
+    let grid = *grid;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
     let smoothing = spec.smoothing(footholds, spacing);

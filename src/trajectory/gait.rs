@@ -11,6 +11,8 @@ use crate::{Error, Result};
 const STAND: f64 = 0.3;
 /// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
 const CYCLE: f64 = 1.0;
+/// Below this duty factor, all feet of a trot, pace or bound are in the air at times. (A little less, because of rounding.)
+const LEAST_DUTY: f64 = 0.4999;
 /// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
 const SHORTEST_PHASE: f64 = 2.0;
 
@@ -33,17 +35,21 @@ impl Gait {
         Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
     }
 
-    /// The same with shorter cycles: more steps, with swings that last as long. None if the gait has no cycle, or the scenario gives
-    /// its length or the duty factor.
+    /// The same with shorter cycles: more steps, with swings that last as long. None if the gait has no cycle, if
+    /// the scenario gives its length or the duty factor, or if feet would stand for less than half of it: a trot would begin to jump.
     pub fn with_more_steps(scenario: &Scenario, robot: &Robot, factor: f64) -> Option<Result<Self>> {
         let gait = &scenario.gait;
         let cyclic = !matches!(gait.kind, GaitKind::Stand | GaitKind::Custom);
         if !cyclic || gait.cycle.is_some() || gait.duty.is_some() {
             return None;
         }
+        let duty = 1.0 - (1.0 - default_duty(gait.kind)) / factor;
+        if duty < LEAST_DUTY {
+            return None;
+        }
         let mut quicker = scenario.clone();
         quicker.gait.cycle = Some(factor * robot.gait_cycle.unwrap_or(CYCLE));
-        quicker.gait.duty = Some(1.0 - (1.0 - default_duty(gait.kind)) / factor);
+        quicker.gait.duty = Some(duty);
         Some(Self::of(&quicker, robot))
     }
 
@@ -221,6 +227,17 @@ mod tests {
         assert_eq!(gait.swings[0], gait.swings[3]);
         assert_eq!(gait.swings[1], gait.swings[2]);
         assert_ne!(gait.swings[0], gait.swings[1]);
+    }
+
+    #[test]
+    fn shorter_cycles_do_not_make_a_trot_jump() {
+        let robot = Robot::load(&crate::robot::RobotSpec::default(), ".".as_ref()).expect("a robot");
+        let exists = |kind: &str, factor: f64| {
+            let scenario = scenario(&format!("[gait]\nkind = \"{kind}\""));
+            Gait::with_more_steps(&scenario, &robot, factor).is_some_and(|gait| gait.is_ok())
+        };
+        assert!(exists("trot", 0.8) && !exists("trot", 0.7));
+        assert!(exists("walk", 0.6) && !exists("stand", 0.9));
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::files::write_atomically;
 use crate::plan::GroundGrid;
 use crate::report::{TerrainView, number, terrain_sheet};
 use crate::scenario::Scenario;
+use crate::terrain::Ground;
 use crate::visible::visible;
 use crate::{Error, Result};
 
@@ -107,13 +108,9 @@ fn ends(read: &Read) -> Option<[([f64; 2], f64); 2]> {
 }
 
 /// Whether nothing was measured at a place.
-fn is_unknown(read: &Read, [x, y]: [f64; 2]) -> bool {
-    let grid = read.ground.field.grid();
-    let at = |v: f64, c: usize, count: usize| {
-        (((v - grid.origin[c]) / grid.spacing[c]).round().max(0.0) as usize).min(count - 1)
-    };
-    let cell = at(y, 1, grid.rows) * grid.columns + at(x, 0, grid.columns);
-    read.ground.unknown.as_ref().is_some_and(|unknown| unknown[cell])
+fn is_unknown(ground: &Ground, place: [f64; 2]) -> bool {
+    let cell = ground.field.grid().nearest(place);
+    cell.zip(ground.unknown.as_ref()).is_some_and(|(cell, unknown)| unknown[cell])
 }
 
 /// What a user should see before planning, in lines.
@@ -165,7 +162,7 @@ fn facts(read: &Read) -> Vec<String> {
     if let Some(ends) = ends(read) {
         for (name, ([x, y], z)) in ["Start:", "Goal:"].into_iter().zip(ends) {
             let z = (1e3 * z).round() / 1e3 + 0.0; // no -0.000
-            let guess = if is_unknown(read, [x, y]) { " (no data there: a guess)" } else { "" };
+            let guess = if is_unknown(&read.ground, [x, y]) { " (no data there: a guess)" } else { "" };
             lines.push(format!("{name:<10} x = {x:.3}, y = {y:.3}, on ground at z = {z:.3} m{guess}"));
         }
     }

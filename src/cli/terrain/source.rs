@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::files::{ensure_no_inputs, ensure_outputs};
-use crate::scenario::{self, LoadedScenario, TerrainSpec};
+use crate::scenario::{self, LoadedScenario};
 use crate::terrain::{self, Ground, Heightmap};
 use crate::{Error, Result};
 
@@ -125,13 +125,8 @@ impl SourceArguments {
 
 fn read(loaded: LoadedScenario, output: Option<&Path>, has_ends: bool) -> Result<Read> {
     ensure_outputs(output.as_slice(), &loaded.files())?;
-    let heightmap = match &loaded.scenario.terrain {
-        TerrainSpec::Heightmap(spec) => {
-            Some(terrain::read_heightmap(spec, &loaded.base_dir).map_err(|e| loaded.locate(e))?)
-        }
-        _ => None,
-    };
-    let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    let built = terrain::build_with_source(&loaded.scenario, &loaded.base_dir);
+    let (ground, heightmap) = built.map_err(|e| loaded.locate(e))?;
     ensure_no_inputs(output.as_slice(), &loaded.paths(&ground.inputs))?;
     Ok(Read { loaded, ground, heightmap, has_ends })
 }
