@@ -7,7 +7,7 @@ use crate::common::{solved_in, standing};
 use crate::terrain::npy;
 use warpgait::check::check;
 use warpgait::pipeline::Prepared;
-use warpgait::plan::Plan;
+use warpgait::plan::{GroundGrid, Plan};
 use warpgait::scenario::load_text;
 
 const COLUMNS: usize = 121;
@@ -100,6 +100,10 @@ fn a_start_in_a_hole_of_the_scan_is_refused() {
 #[test]
 fn the_check_counts_footholds_in_holes_that_are_wider_than_a_foot() {
     let mut plan = standing();
+    // Cells of 2 cm, under feet of 6 cm.
+    let (rows, columns) = (101, 201);
+    plan.ground =
+        GroundGrid { rows, columns, spacing: [0.02; 2], height: vec![0.0; rows * columns], ..plan.ground };
     let grid = plan.ground.clone();
     let near = |i: usize, place: [f64; 2], distance: f64| {
         let x = grid.origin[0] + grid.spacing[0] * (i % grid.columns) as f64 - place[0];
@@ -109,9 +113,8 @@ fn the_check_counts_footholds_in_holes_that_are_wider_than_a_foot() {
     let unknown = |distance: f64| -> Vec<bool> {
         (0..grid.height.len()).map(|i| near(i, [0.34, 0.19], distance)).collect()
     };
-    let (small, wide) = (unknown(0.03), unknown(0.13));
+    let (small, wide) = (unknown(0.019), unknown(0.13));
     plan.ground.unknown = Some(small);
-    plan.meta.robot.foot_radius = 0.055;
     assert_eq!(value(&plan, "unknown_ground"), Some(0.0));
     plan.ground.unknown = Some(wide);
     assert_eq!(value(&plan, "unknown_ground"), Some(1.0));
