@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::sha256_hex;
 use crate::input::{self, Document};
-use crate::leg::Leg;
+use crate::leg::{Leg, LegSpec};
 use crate::{Error, Result};
 
 /// The robots that ship with the program: name and content of `robots/NAME.toml`.
@@ -66,7 +66,14 @@ pub struct Foot {
     pub reach: Box3,
     /// The leg, if known: the limits of its joints' speeds and torques then hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub leg: Option<Leg>,
+    pub leg: Option<LegSpec>,
+}
+
+impl Foot {
+    /// The leg, if the file describes it. (A robot whose file describes a leg that cannot be is not loaded.)
+    pub fn leg(&self) -> Option<Leg> {
+        self.leg.as_ref().and_then(|leg| leg.build(self.nominal).ok())
+    }
 }
 
 /// Mass, inertia and reach of a robot (`robots/NAME.toml`).
@@ -150,7 +157,7 @@ impl Robot {
     }
 
     /// The largest of a length of the legs; none if it is zero, or no leg is described.
-    fn largest(&self, length: impl Fn(&Leg) -> f64) -> Option<f64> {
+    fn largest(&self, length: impl Fn(&LegSpec) -> f64) -> Option<f64> {
         self.feet
             .iter()
             .filter_map(|foot| foot.leg.as_ref())
@@ -203,14 +210,10 @@ impl Robot {
                 return Err(document.error(&format!("{key}.nominal"), "lies outside the foot's reach box"));
             }
             if let Some(leg) = &foot.leg {
-                if leg.bend.abs() != 1.0 {
-                    let what = format!("given {}, allowed: 1 or -1", leg.bend);
-                    return Err(document.error(&format!("{key}.leg.bend"), what));
-                }
-                if !leg.reaches(foot.nominal) {
-                    let what = "does not reach the foot's nominal position; lengths and hip are in m from the center of mass";
-                    return Err(document.error(&format!("{key}.leg"), what));
-                }
+                leg.build(foot.nominal).map_err(|e| {
+                    let dot = if e.key.is_empty() { "" } else { "." };
+                    document.error(&format!("{key}.leg{dot}{}", e.key), e.what)
+                })?;
             }
         }
         Ok(robot)
@@ -241,7 +244,10 @@ mod tests {
     use super::*;
 
     fn changed(from: &str, to: &str) -> Result<Robot> {
-        let text = SHIPPED[0].1;
+        changed_in(SHIPPED[0].1, from, to)
+    }
+
+    fn changed_in(text: &str, from: &str, to: &str) -> Result<Robot> {
         assert!(text.contains(from), "{from} is not in the shipped file");
         Robot::from_document(&Document::parse("robot.toml", &text.replacen(from, to, 1))?)
     }
@@ -278,6 +284,61 @@ mod tests {
         ] {
             let message = changed(from, to).expect_err(to).to_string();
             assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn impossible_legs_are_refused() {
+        let anymal_c = SHIPPED[2].1;
+        let closed = "[feet.leg]\nhip = [0.3688, 0.1041, 0.0506]\nlateral = 0.1972\nthigh = 0.2850\nshank = 0.3275\nbend = 1.0\n\
+                      speed_limit = 7.5\ntorque_limit = [80.0, 80.0, 80.0]\n";
+        assert!(changed_in(anymal_c, "[feet.leg]\n", closed).is_ok(), "both descriptions of a leg");
+        for (from, to, expected) in [
+            ("axis = [1.000000, 0.000000,", "axis = [1.100000, 0.000000,", "leg.joints[0].axis: given [1.1"),
+            ("axis = [1.000000, 0.000000,", "axis = [0.000000, 1.000000,", "leg.stance: puts the foot"),
+            ("mass = 2.781", "mass = -2.781", "leg.joints[0].mass: given -2.781"),
+            ("[0.00329553,", "[0.00029553,", "leg.joints[0].inertia: principal moments"),
+            ("[0.00329553,", "[-0.00329553,", "leg.joints[0].inertia: principal moments"),
+            ("range = [-0.7200, 0.4900]", "range = [0.7200, -0.4900]", "leg.joints[0].range: given"),
+            ("range = [-0.7200, 0.4900]", "range = [0.7200, 0.9900]", "leg.stance: -0.1393 rad for LF_HAA"),
+            ("stance = [-0.1393,", "stance = [0.1393,", "leg.stance: puts the foot"),
+            ("stance = [-0.1393,", "# [-0.1393,", "leg.stance: missing"),
+            ("foot = [0.087950,", "# [0.087950,", "leg.foot: missing"),
+            ("[feet.leg]\n", "[feet.leg]\nthigh = 0.3\n", "leg.hip: missing"),
+            ("[feet.leg]\n", &closed.replace("0.2850", "0.2950"), "leg.thigh: contradicts `joints`"),
+            ("[feet.leg]\n", &closed.replace("7.5", "8.5"), "leg.speed_limit: contradicts"),
+            ("[feet.leg]\n", &closed.replace("bend = 1.0", "bend = -1.0"), "leg.bend: contradicts"),
+            ("[feet.leg]\n", &closed.replace("bend = 1.0", "bend = 0.5"), "leg.bend: given 0.5"),
+        ] {
+            let message = changed_in(anymal_c, from, to).expect_err(to).to_string();
+            assert!(message.contains(&format!("feet[0].{expected}")), "{message}");
+        }
+        let end = anymal_c.find("[[feet.leg.joints]]\nname = \"LF_KFE\"").unwrap();
+        let next = end + anymal_c[end..].find("\n[[feet]]").unwrap();
+        let two = format!("{}{}", &anymal_c[..end], &anymal_c[next..]);
+        let message = changed_in(&two, "LF", "LF").unwrap_err().to_string();
+        assert!(message.contains("leg.joints: given 2"), "{message}");
+    }
+
+    /// Files of earlier versions have no joints.
+    #[test]
+    fn a_leg_in_closed_form_is_that_of_its_joints() {
+        let anymal_c = SHIPPED[2].1;
+        let start = anymal_c.find("foot = [0.087950").unwrap();
+        let end = start + anymal_c[start..].find("\n[[feet]]").unwrap();
+        let closed = "hip = [0.3688, 0.1041, 0.0506]\nlateral = 0.1972\nthigh = 0.2850\nshank = 0.3275\nbend = 1.0\n\
+                      speed_limit = 7.5\ntorque_limit = [80.0, 80.0, 80.0]\n";
+        let text = format!("{}{closed}{}", &anymal_c[..start], &anymal_c[end..]);
+        let robot = changed_in(&text, "LF", "LF").unwrap();
+        let [old, new] =
+            [&robot, &changed_in(anymal_c, "LF", "LF").unwrap()].map(|r| r.feet[0].leg().unwrap());
+        for r in [[0.389, 0.240, -0.429], [0.25, 0.1, -0.4], [0.5, 0.3, -0.35]] {
+            let [old, new] = [old, new].map(|leg| leg.posture::<f64>(r));
+            for (a, b) in
+                old.angles().into_iter().chain(old.knee()).zip(new.angles().into_iter().chain(new.knee()))
+            {
+                assert!((a - b).abs() < 1e-3, "{a} {b}");
+            }
         }
     }
 

@@ -48,6 +48,9 @@ impl JointSpeed {
     }
 }
 
+/// Number of the joint whose angle φ is; κ is that of the next.
+const FIRST: usize = 1;
+
 /// φ and κ at a sample.
 fn angles<T: Scalar>(leg: &Leg, r: [T; 3]) -> [T; 2] {
     leg.posture(r).angles()
@@ -58,8 +61,8 @@ fn jets(model: &Model, state: &State, (i, ends, leg): &(usize, [Instant; 2], Leg
 }
 
 /// Derivative of a row with respect to the angle at its start (0) or end (1).
-fn scale(model: &Model, leg: &Leg, after: usize) -> f64 {
-    (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step * leg.speed_limit)
+fn scale(model: &Model, leg: &Leg, j: usize, after: usize) -> f64 {
+    (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step * leg.speed_limit[FIRST + j])
 }
 
 impl Constraint for JointSpeed {
@@ -81,7 +84,7 @@ impl Constraint for JointSpeed {
             let [before, after] =
                 ends.map(|at| angles(&leg, foot_in_base::value(model, state, (i, at)).into()));
             for (j, row) in rows.iter_mut().enumerate() {
-                *row = (after[j] - before[j]) * scale(model, &leg, 1);
+                *row = (after[j] - before[j]) * scale(model, &leg, j, 1);
             }
         }
     }
@@ -89,15 +92,10 @@ impl Constraint for JointSpeed {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (n, place) in self.places.iter().enumerate() {
             for after in 0..2 {
-                let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
+                let at = (place.0, place.1[after]);
                 for (j, jet) in jets(model, state, place, after).iter().enumerate() {
-                    foot_in_base::add_derivative(
-                        model,
-                        state,
-                        at,
-                        &(jet.first * scale),
-                        &mut sink.row(first + 2 * n + j),
-                    );
+                    let by_r = jet.first * scale(model, &place.2, j, after);
+                    foot_in_base::add_derivative(model, state, at, &by_r, &mut sink.row(first + 2 * n + j));
                 }
             }
         }
@@ -113,9 +111,10 @@ impl Constraint for JointSpeed {
     ) {
         for (lambda, place) in multipliers.chunks_exact(2).zip(&self.places) {
             for after in 0..2 {
-                let (at, scale) = ((place.0, place.1[after]), scale(model, &place.2, after));
+                let at = (place.0, place.1[after]);
                 let [thigh, knee] = jets(model, state, place, after);
-                let sum = thigh * (lambda[0] * scale) + knee * (lambda[1] * scale);
+                let weight = |j: usize| lambda[j] * scale(model, &place.2, j, after);
+                let sum = thigh * weight(0) + knee * weight(1);
                 foot_in_base::add_quadratic(model, state, at, &sum.second, curvature);
                 foot_in_base::add_curvature(model, state, at, &sum.first, curvature);
             }

@@ -15,8 +15,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
-use crate::leg::Leg;
 use crate::leg::jet::{Jet, Scalar};
+use crate::leg::{Leg, ShankShape};
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::ground_normal::clearance;
@@ -61,7 +61,7 @@ impl KneeClearance {
         for (foot, leg) in model.legs.iter().enumerate() {
             let Some(leg) = *leg else { continue };
             for k in 0..=model.layout.intervals {
-                let near_edge = is_near_edge(model, foot, k, leg.shank);
+                let near_edge = is_near_edge(model, foot, k, leg.shank_length());
                 if near_edge || k % STRIDE == 0 {
                     places.push(LegPlace { foot, at: k.into(), leg, near_edge });
                 }
@@ -103,14 +103,16 @@ impl LegPlace {
 
     /// Points of the tube from its upper end on; the foot itself is not among them.
     fn tube_points(&self) -> usize {
-        let Leg { tube, shank, foot_radius, .. } = self.leg;
+        let Leg { shank: shape, foot_radius, .. } = self.leg;
+        let (tube, shank) = (shape.tube, self.leg.shank_length());
         let spacing = TUBE_SPACING * foot_radius.max(LEAST_RADIUS * shank);
         if self.near_edge { ((shank - tube[0]).hypot(tube[1]) / spacing).ceil() as usize } else { 0 }
     }
 
     /// The points v(r): knee, corner, and near edges those of the tube.
     fn points<T: Scalar>(&self, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
-        let Leg { corner, tube, shank, .. } = self.leg;
+        let ShankShape { corner, tube, .. } = self.leg.shank;
+        let shank = self.leg.shank_length();
         let posture = self.leg.posture(r);
         let count = self.tube_points();
         let of_tube = (0..count).map(move |n| {
@@ -189,8 +191,8 @@ impl Constraint for KneeClearance {
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         lower.fill(margins::KNEE_CLEARANCE);
         for (place, first) in self.numbered() {
-            lower[first] += place.leg.knee_radius;
-            let tube = place.leg.tube_radius.unwrap_or(place.leg.foot_radius) + margins::SHANK_CLEARANCE;
+            lower[first] += place.leg.shank.knee_radius;
+            let tube = place.leg.shank.tube_radius + margins::SHANK_CLEARANCE;
             lower[first + 2..first + place.rows()].fill(tube);
         }
         upper.fill(f64::INFINITY);

@@ -20,6 +20,10 @@ pub trait Scalar:
     fn recip(self) -> Self;
     /// The polar angle of the point (x, self), which must not be the origin.
     fn atan2(self, x: Self) -> Self;
+    /// Its sine and cosine.
+    fn sin_cos(self) -> [Self; 2];
+    /// It without its derivatives.
+    fn value(self) -> f64;
 }
 
 impl Scalar for f64 {
@@ -33,6 +37,14 @@ impl Scalar for f64 {
 
     fn atan2(self, x: Self) -> Self {
         self.atan2(x)
+    }
+
+    fn sin_cos(self) -> [Self; 2] {
+        self.sin_cos().into()
+    }
+
+    fn value(self) -> f64 {
+        self
     }
 }
 
@@ -88,6 +100,15 @@ impl Scalar for Jet {
             first: turn / square,
             second: (bent + mixed - turn * growth.transpose()) / square,
         }
+    }
+
+    fn sin_cos(self) -> [Self; 2] {
+        let (sin, cos) = self.value.sin_cos();
+        [self.chain(sin, cos, -sin), self.chain(cos, -sin, -cos)]
+    }
+
+    fn value(self) -> f64 {
+        self.value
     }
 }
 
@@ -154,7 +175,8 @@ mod tests {
 
     /// A function that uses all operations.
     fn function<T: Scalar>([x, y, z]: [T; 3]) -> T {
-        (x * y - z * 0.3 + 2.0).sqrt().atan2(y * z + 1.7) + (x * x + 0.5).recip() * -z
+        let [sin, cos] = (x * z + y).sin_cos();
+        (x * y - z * 0.3 + 2.0).sqrt().atan2(y * z + 1.7) + (x * x + 0.5).recip() * -z + sin * cos * x
     }
 
     #[test]

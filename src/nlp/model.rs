@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::leg::Leg;
-use crate::robot::{Box3, Robot};
+use crate::robot::{Box3, Foot, Robot};
 use crate::scenario::Scenario;
 use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::layout::KnotSpacing;
@@ -76,7 +76,7 @@ impl Model {
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),
-            legs: robot.feet.iter().map(|f| f.leg).collect(),
+            legs: robot.feet.iter().map(Foot::leg).collect(),
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
             foot_names,
             underside,

@@ -98,9 +98,14 @@ class Indices:
     power_limit: Array  # (E, 3) W; where the model does not say, torque times speed
 
     @property
+    def joints_of(self) -> list[list[str]]:
+        """Names of the joints of each leg, from the base to the foot."""
+        return [[f"{foot}_{joint}" for joint in JOINTS] for foot in self.feet]
+
+    @property
     def joint_names(self) -> list[str]:
         """The 3E joints, leg by leg."""
-        return [f"{foot}_{joint}" for foot in self.feet for joint in JOINTS]
+        return [name for names in self.joints_of for name in names]
 
 
 def foot_of(body: str, feet: Iterable[str]) -> str | None:
@@ -153,18 +158,24 @@ def indices(model: Any, feet: tuple[str, ...]) -> Indices:
         raise InputError(f"the robot model lacks a part that the replay needs (feet {', '.join(feet)}): {error}") from error
 
 
+def merged(model: Any, data: Any, bodies: list[int]) -> tuple[float, Array, Array]:
+    """Mass, center of mass and inertia about it, world frame, of `bodies` as one rigid body in the posture in `data`."""
+    mass = float(model.body_mass[bodies].sum())
+    center = model.body_mass[bodies] @ data.xipos[bodies] / mass
+    inertia = np.zeros((3, 3))
+    for b in bodies:
+        R = data.ximat[b].reshape(3, 3)
+        r = data.xipos[b] - center
+        inertia += R @ np.diag(model.body_inertia[b]) @ R.T + model.body_mass[b] * (r @ r * np.eye(3) - np.outer(r, r))
+    return mass, center, inertia
+
+
 def composite(model: Any, data: Any) -> Composite:
     """Mass, center of mass and inertia of the posture in `data`, whose positions must be up to date."""
     base = model.body("base").id
     rotation = data.xmat[base].reshape(3, 3)
-    mass = model.body_mass.sum()
-    center = model.body_mass @ data.xipos / mass
-    inertia = np.zeros((3, 3))
-    for b in range(1, model.nbody):
-        R = data.ximat[b].reshape(3, 3)
-        r = data.xipos[b] - center
-        inertia += R @ np.diag(model.body_inertia[b]) @ R.T + model.body_mass[b] * (r @ r * np.eye(3) - np.outer(r, r))
-    return Composite(float(mass), rotation.T @ (center - data.xpos[base]), rotation.T @ inertia @ rotation)
+    mass, center, inertia = merged(model, data, list(range(1, model.nbody)))
+    return Composite(mass, rotation.T @ (center - data.xpos[base]), rotation.T @ inertia @ rotation)
 
 
 def stand(model: Any, data: Any) -> None:

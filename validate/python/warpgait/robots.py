@@ -16,11 +16,12 @@ import mujoco
 import numpy as np
 
 from .arrays import Array
+from .chain import Chain, Joint, chains
 from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import write_text
 from .kinematics import Leg, legs
-from .model import JOINTS, Composite, available_models, check_mujoco, composite, find_model, foot_names, indices, load_spec, stand
+from .model import Composite, available_models, check_mujoco, composite, find_model, foot_names, indices, load_spec, stand
 from .reach import Box, ReachRules, reach_box, reached
 
 LEAST_BOX = np.array([0.30, 0.20, 0.20])
@@ -41,11 +42,9 @@ class CentroidalRobot:
     nominal: Array  # (E, 3) contact points
     reach: tuple[Box, ...]
     shank: ShankShape
-    legs: tuple[Leg, ...]  # hips relative to the base's origin, as the model has them
+    legs: tuple[Chain, ...]  # the first joints relative to the base's origin, as the model has them
     radius: float  # m, of the feet
-    speed_limit: float  # rad/s
     gait_cycle: float | None  # s, if the model has one
-    torque_limit: Array  # (E, 3) N m
     rules: ReachRules  # of the reach boxes
 
 
@@ -167,11 +166,9 @@ def derive(path: Path, rules: ReachRules | None = None, resolution: float = 0.01
         nominal=nominal,
         reach=tuple(boxes),
         shank=shank_shape(model, all_legs[0]),
-        legs=tuple(all_legs),
+        legs=tuple(chains(model, index, data.qpos[index.qpos])),
         radius=index.radius,
-        speed_limit=index.speed_limit,
         gait_cycle=float(model.numeric("gait_cycle").data[0]) if "gait_cycle" in names else None,
-        torque_limit=index.torque_limit,
         rules=rules,
     )
 
@@ -182,8 +179,7 @@ def _row(values: Array, digits: int = 3) -> str:
 
 def _foot_lines(robot: CentroidalRobot, e: int) -> list[str]:
     """The table of foot number `e`."""
-    box, leg = robot.reach[e], robot.legs[e]
-    hip = leg.hip + np.array([leg.flexion_offset, 0, 0]) - robot.body.center_of_mass
+    box, leg, center = robot.reach[e], robot.legs[e], robot.body.center_of_mass
     return [
         "",
         "[[feet]]",
@@ -191,18 +187,31 @@ def _foot_lines(robot: CentroidalRobot, e: int) -> list[str]:
         f"nominal = {_row(robot.nominal[e])}              # m",
         f"reach = {{ center = {_row(box.center)}, half_size = {_row(box.half_size)} }}   # m",
         "[feet.leg]",
-        f"hip = {_row(hip, 4)}                  # m",
-        f"lateral = {leg.lateral:.4f}                            # m",
-        f"thigh = {leg.thigh:.4f}                              # m",
-        f"shank = {leg.shank:.4f}                              # m",
         f"knee_radius = {robot.shank.knee_radius:.4f}                        # m",
         f"corner = {_row(np.array(robot.shank.corner), 4)}                  # m, of the shank, from the knee",
         f"tube = {_row(np.array(robot.shank.tube), 4)}                    # m, upper end of the axis of the shank's tube, which leads to the foot",
         f"tube_radius = {robot.shank.tube_radius:.4f}                        # m",
-        f"bend = {leg.bend:.1f}                                  # the knee bends the shank forward (1) or back (-1)",
         f"foot_radius = {robot.radius:g}                         # m",
-        f"speed_limit = {robot.speed_limit:.1f}                           # rad/s, each joint",
-        f"torque_limit = {_row(robot.torque_limit[e], 1)}           # N m, {', '.join(JOINTS)}",
+        f"foot = {_row(leg.foot, 6)}        # m, its center from the last joint",
+        f"stance = {_row(leg.stance, 4)}             # rad",
+        *(line for j, joint in enumerate(leg.joints) for line in _joint_lines(joint, center if j == 0 else np.zeros(3))),
+    ]
+
+
+def _joint_lines(joint: Joint, origin: Array) -> list[str]:
+    """The table of a joint, whose position is given from `origin`."""
+    tensor = [joint.inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return [
+        "[[feet.leg.joints]]",
+        f'name = "{joint.name}"',
+        f"position = {_row(joint.position - origin, 6)}",
+        f"axis = {_row(joint.axis, 6)}",
+        f"range = {_row(joint.range, 4)}",
+        f"speed_limit = {joint.speed_limit:g}",
+        f"torque_limit = {joint.torque_limit:g}",
+        f"mass = {joint.mass:.6g}",
+        f"center = {_row(joint.center, 6)}",
+        f"inertia = [{', '.join(f'{v + 0.0:.6g}' for v in tensor)}]",
     ]
 
 
@@ -226,7 +235,8 @@ def to_toml(robot: CentroidalRobot) -> str:
         "# Reach: the largest box of contact points within the joint limits, with the knee bent by "
         f"{knee_least:g}–{knee_most:g} rad, |HFE| ≤ {np.degrees(rules.flexion):.0f}°, and the foot",
         f"# clear of the trunk, on ground tilted by up to {np.degrees(rules.tilt):.0f}°. Its edges are at least {_row(LEAST_BOX, 2)} m.",
-        "# Legs: hip is x of the flexion axis, y and z of the abduction axis. Lengths are to the foot's center, in the plane of the leg.",
+        "# Joints: position from the one before (the first: from the center of mass), m; axis; range, rad; speed_limit, rad/s; torque_limit, N m;",
+        "# and of the link that the joint moves: mass, kg; center of mass from the joint, m; inertia about it, xx yy zz xy xz yz, kg m².",
     ]
     for e in range(len(robot.feet)):
         lines += _foot_lines(robot, e)
