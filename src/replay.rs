@@ -39,7 +39,7 @@ pub fn python() -> Result<PathBuf> {
     }
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
         Error::input(format!(
-            "the replay needs the Python package `warpgait`, which neither .venv in the program's repository nor python3 has; \
+            "this needs the Python package `warpgait`, which neither .venv in the program's repository nor python3 has; \
              run scripts/setup --python in the folder of the repository, or pip install ./validate in an environment of yours \
              and name its Python: {PYTHON_VARIABLE}=.venv/bin/python",
         ))

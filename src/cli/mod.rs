@@ -8,10 +8,12 @@ mod bench;
 mod check;
 mod console;
 mod ending;
+mod export;
 mod figures;
 mod init;
 mod map;
 mod progress_line;
+mod python;
 mod schema;
 mod solve;
 mod terrain;
@@ -32,6 +34,7 @@ Examples:
   warpgait solve hill.toml            plan it: hill.plan.npz and hill.svg
   warpgait check hill.plan.npz        recompute every law of the plan
   warpgait validate hill.plan.npz     replay the plan in MuJoCo
+  warpgait export hill.plan.npz --to csv            the motion for trainers, robots and viewers
   warpgait terrain show scan.npy --spacing 0.04     draw a ground before planning on it
   warpgait map hill.toml              build and judge the warp map alone
   warpgait bench table1 --quick       a few cases of the paper's Table I
@@ -74,6 +77,8 @@ enum Command {
     BenchCase(bench::CaseArguments),
     /// Replay a plan on the full robot in MuJoCo (needs the Python package)
     Validate(validate::ValidateArguments),
+    /// Write the motion of a plan for trainers, robots and viewers (needs the Python package)
+    Export(export::ExportArguments),
 }
 
 /// Runs the program with the arguments of the process.
@@ -112,7 +117,11 @@ pub fn run() -> ExitCode {
 impl Command {
     /// Whether `--json` is among the arguments that are passed on to Python.
     fn has_json(&self) -> bool {
-        matches!(self, Command::Validate(arguments) if arguments.has_json())
+        match self {
+            Command::Validate(arguments) => arguments.python.has_json(),
+            Command::Export(arguments) => arguments.python.has_json(),
+            _ => false,
+        }
     }
 }
 
@@ -126,6 +135,7 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Check(arguments) => check::check(&arguments, console),
         Command::Bench(arguments) => bench::bench(arguments, console),
         Command::BenchCase(arguments) => bench::case(&arguments),
-        Command::Validate(arguments) => validate::validate(&arguments, console),
+        Command::Validate(arguments) => arguments.python.run("warpgait.validate", console),
+        Command::Export(arguments) => arguments.python.run("warpgait.export", console),
     }
 }

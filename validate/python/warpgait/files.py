@@ -26,6 +26,11 @@ _OLD = 24 * 3600.0  # s; where files cannot be locked, older temporary files cou
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
 
+def stem_of(plan: Path) -> str:
+    """NAME of a NAME.plan.npz: what is made from a plan is called after it."""
+    return plan.name.removesuffix(".npz").removesuffix(".plan")
+
+
 def kind(about: os.stat_result) -> str:
     """What something is that is not a regular file."""
     return _KINDS.get(stat.S_IFMT(about.st_mode), "a device")

@@ -10,9 +10,22 @@ import numpy.typing as npt
 
 from .errors import InputError
 from .files import write_bytes
+from .plan import Heightfield
 
 LAYOUTS = ("picture", "y-up", "x-y", "grid-map")
 _MOST_CELLS = 4096 * 4096
+_SQUARE = 1e-6  # of the spacing, by which a cell may differ from a square
+
+
+def write_heightfield(path: Path, ground: Heightfield) -> None:
+    """Write the ground of a plan as a file that `terrain.file` can name, `layout` y-up. Its cells must be squares; raises `InputError`."""
+    if abs(ground.spacing[0] - ground.spacing[1]) > _SQUARE * ground.spacing[0]:
+        raise InputError(
+            f"{path}: the cells of the ground are {ground.spacing[0]:g} m by {ground.spacing[1]:g} m; a file of heights has squares"
+        )
+    center = ground.origin + 0.5 * ground.spacing * (np.array(ground.heights.shape)[::-1] - 1)
+    place = float(center[0]), float(center[1])
+    write_terrain(path, ground.heights, spacing=float(ground.spacing[0]), layout="y-up", origin=place)
 
 
 def write_terrain(

@@ -126,6 +126,14 @@ def load_spec(path: Path) -> Any:
         raise InputError(f"{path}: not a usable MJCF model: {error}") from error
 
 
+def load_robot(path: Path, gravity: Array) -> Any:
+    """The robot alone, in this gravity (3,) m/s², without contacts."""
+    spec = load_spec(path)
+    spec.option.gravity = gravity
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
+    return spec.compile()
+
+
 def foot_names(model: Any) -> tuple[str, ...]:
     """The feet of a model: its sites, in the order of the file."""
     return tuple(model.site(i).name for i in range(model.nsite))

@@ -162,11 +162,15 @@ def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: 
     return residual, torque
 
 
+def rolled_postures(plan: Plan, model: Any, index: Indices) -> tuple[Postures, Rolling]:
+    """Postures along the plan whose feet roll while they stand, as those of a robot do."""
+    rolling = roll(plan, postures(plan, model, index, no_rolling(plan)).shank, index.radius)
+    return postures(plan, model, index, rolling), rolling
+
+
 def analyze(plan: Plan, model: Any, world: Any, index: Indices) -> OpenLoop:
     """Inverse kinematics and inverse dynamics of `model` along the plan, and which parts would be in the ground of `world`."""
-    shank = postures(plan, model, index, no_rolling(plan)).shank
-    rolling = roll(plan, shank, index.radius)
-    found = postures(plan, model, index, rolling)
+    found, rolling = rolled_postures(plan, model, index)
     qvel, qacc = joint_motion(plan, model, found.qpos)
     residual, torque = inverse_dynamics(plan, model, index, found.qpos, qvel, qacc)
     return OpenLoop(

@@ -5,6 +5,7 @@ World frame: x forward, y left, z up. SI units. N samples, E feet. Quaternions a
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -84,6 +85,7 @@ class Plan:
     """A plan as read from its file."""
 
     path: Path
+    sha256: str  # of the file
     t: Array  # (N,) s, uniform from 0
     base_position: Array  # (N, 3) center of mass
     base_quaternion_wxyz: Array  # (N, 4) body to world
@@ -290,6 +292,7 @@ def read_plan(path: str | Path) -> Plan:
     solver = meta.get("solver")
     return Plan(
         path=path,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         **values,
         foot_names=tuple(str(n) for n in names),
         terrain=Heightfield(heights, origin, spacing),

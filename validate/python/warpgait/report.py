@@ -52,6 +52,7 @@ def as_dict(v: Validation) -> dict[str, Any]:
     return {
         "schema": REPORT_SCHEMA,
         "plan": v.plan.path.name,
+        "plan_sha256": v.plan.sha256,
         "verdict": v.verdict.word,
         "trackable": v.trackable,
         "first_failure": None if first is None else _incident(first),
@@ -87,7 +88,7 @@ def write_replay(v: Validation, target: Path) -> None:
     Members: `t` (K,) s; `base_position` (K,3) m, the origin of the base body (not the center of mass); `base_quaternion_wxyz` (K,4);
     `base_linear_velocity` (K,3) m/s, world; `base_angular_velocity` (K,3) rad/s, base frame; `center_of_mass` (K,3) m;
     `q`, `qd`, `tau` (K,3E) rad, rad/s, N m in the order of `joint_names`; `foot_contact` (K,E); `foot_force` (K,E,3) N, ground on robot;
-    `foot_position` (K,E,3) m, the feet's centers; `foot_names` (E,).
+    `foot_position` (K,E,3) m, the feet's centers; `foot_names` (E,); `plan_sha256`, of the plan file.
     """
     r, index = v.trials[0].replay, v.index
     members: dict[str, Any] = {
@@ -103,6 +104,7 @@ def write_replay(v: Validation, target: Path) -> None:
         "foot_contact": r.contact,
         "foot_force": r.force,
         "foot_position": r.foot,
+        "plan_sha256": np.array(v.plan.sha256),
         "joint_names": np.array(index.joint_names),
         "foot_names": np.array(index.feet),
     }

@@ -77,7 +77,7 @@ def _add_adhesion(spec: Any, geom: Any, strength: float) -> None:
     actuator.set_to_adhesion(strength)
 
 
-def build_world(
+def world_spec(
     path: Path,
     terrain: Heightfield,
     friction: float,
@@ -87,7 +87,7 @@ def build_world(
     disturbance: Disturbance | None = None,
     cell: float = CELL,
 ) -> Any:
-    """Compile the MuJoCo model of robot and terrain. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N."""
+    """Robot and terrain as an editable `MjSpec`. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N."""
     disturbance = disturbance or Disturbance()
     spec = load_spec(path)
     spec.option.timestep = 1 / PHYSICS_RATES[0]
@@ -104,4 +104,9 @@ def build_world(
             geom.friction = [mu, TORSIONAL_FRICTION, ROLLING_FRICTION]
             if geom.name in adhesive:
                 _add_adhesion(spec, geom, adhesion)
-    return spec.compile()
+    return spec
+
+
+def build_world(*arguments: Any, **options: Any) -> Any:
+    """The compiled model of `world_spec`, with the same arguments."""
+    return world_spec(*arguments, **options).compile()

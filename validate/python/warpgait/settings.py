@@ -6,6 +6,9 @@ Error messages name the options of `warpgait validate`. This module does not imp
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -79,3 +82,16 @@ class Settings:
         if not in_range or abs(PHYSICS_RATES[0] / self.rate - round(PHYSICS_RATES[0] / self.rate)) > 1e-9:
             expected = f"{PHYSICS_RATES[0]:g} Hz divided by a whole number, and at least {LOWEST_CONTROL_RATE:g}"
             raise _refuse("rate", self.rate, expected)
+
+
+@contextmanager
+def without_opengl() -> Iterator[None]:
+    """On import, MuJoCo loads the OpenGL that $MUJOCO_GL names, and fails if there is none. Only the rendering process needs it."""
+    requested = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        os.environ.pop("MUJOCO_GL")
+        if requested is not None:
+            os.environ["MUJOCO_GL"] = requested

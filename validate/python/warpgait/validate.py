@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .console import ERROR, OutputError, complain, emit, run
 from .errors import InputError, error_page, error_report
-from .files import ensure_outputs, write_text
-from .settings import MUJOCO_VERSION, Disturbance, Settings
+from .files import ensure_outputs, stem_of, write_text
+from .settings import MUJOCO_VERSION, Disturbance, Settings, without_opengl
 from .text import visible
 
 if TYPE_CHECKING:
@@ -31,10 +30,6 @@ if TYPE_CHECKING:
 REPORTS = ".report.json", ".report.html"  # endings
 TRACKABLE, NOT_TRACKABLE, INTERRUPTED = 0, 1, 130  # exit codes; 2 is `ERROR`
 UNFINISHED = "the replay has not finished"
-
-
-def _stem(plan: Path) -> str:
-    return plan.name.removesuffix(".npz").removesuffix(".plan")
 
 
 def _numbers(count: int, what: str) -> type[argparse.Action]:
@@ -125,23 +120,10 @@ def _settings(options: argparse.Namespace) -> Settings:
     return Settings(options.model, options.rate, quick=options.quick, raw=not options.no_raw, disturbance=disturbance)
 
 
-@contextmanager
-def _without_opengl() -> Iterator[None]:
-    """On import, MuJoCo loads the OpenGL that $MUJOCO_GL names, and fails if there is none. Only the rendering process needs it."""
-    requested = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = "disable"
-    try:
-        yield
-    finally:
-        os.environ.pop("MUJOCO_GL")
-        if requested is not None:
-            os.environ["MUJOCO_GL"] = requested
-
-
 def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
     """Read the plan, replay it, write the files, and print the verdict; returns the exit code."""
     try:
-        with _without_opengl():
+        with without_opengl():
             from . import plan, validation
     except ImportError as error:
         packages = f"mujoco=={MUJOCO_VERSION} daqp numpy scipy"
@@ -175,7 +157,7 @@ def _make_folder(folder: Path) -> None:
 def _outputs(options: argparse.Namespace, folder: Path) -> list[Path]:
     """The files that a run writes."""
     pictures = [".png"] * options.still + [".mp4"] * options.video
-    return [folder / f"{_stem(options.plan)}{end}" for end in (*REPORTS, ".replay.npz", *pictures)]
+    return [folder / f"{stem_of(options.plan)}{end}" for end in (*REPORTS, ".replay.npz", *pictures)]
 
 
 def _inputs(options: argparse.Namespace) -> list[Path]:
@@ -193,7 +175,7 @@ def _print(options: argparse.Namespace, folder: Path, found: Validation) -> None
         return
     lines = _summary(found)
     if not options.no_files:
-        lines.append(visible(folder / f"{_stem(options.plan)}.report.html"))
+        lines.append(visible(folder / f"{stem_of(options.plan)}.report.html"))
     emit("\n".join(lines))
 
 
@@ -201,7 +183,7 @@ def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Ca
     """The report, the replay, and pictures and film as asked for."""
     from . import film, page, report
 
-    stem = _stem(options.plan)
+    stem = stem_of(options.plan)
     pictures: list[tuple[float, bytes]] = []
     note = None
     try:
@@ -274,7 +256,7 @@ def _replace_reports(options: argparse.Namespace, folder: Path, message: str, on
     name = options.plan.name
     texts = json.dumps(error_report(name, message), indent=2, ensure_ascii=False) + "\n", error_page(name, message)
     for end, text in zip(REPORTS, texts, strict=True):
-        report = folder / f"{_stem(options.plan)}{end}"
+        report = folder / f"{stem_of(options.plan)}{end}"
         if report.exists() or (end == REPORTS[0] and not only_old):
             with suppress(InputError, OSError):
                 ensure_outputs([report], _inputs(options))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from . import laws
@@ -18,7 +17,7 @@ from .controllers import WholeBody
 from .criteria import Metric, Verdict
 from .errors import InputError
 from .metrics import OPEN_LOOP, judge_closed_loop, judge_collisions, judge_open_loop
-from .model import Indices, check_mujoco, find_model, indices, load_spec, model_file
+from .model import Indices, check_mujoco, find_model, indices, load_robot, load_spec, model_file
 from .openloop import OpenLoop, analyze
 from .plan import Heightfield, Plan
 from .reference import Reference, sample
@@ -112,10 +111,7 @@ class _Robot:
 def _robot(plan: Plan, model: str | None) -> _Robot:
     """Load `model`, or the full model of the plan's robot."""
     path = model_file(model) if model else find_model(plan.robot.name)
-    spec = load_spec(path)
-    spec.option.gravity = plan.robot.gravity
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
-    own = spec.compile()
+    own = load_robot(path, plan.robot.gravity)
     limit = plan.pull_limit * plan.weight
     adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
     pull = np.where(plan.foot_adhesive, limit, 0.0)

@@ -1,0 +1,58 @@
+//! Runs a command of the Python package in place of this program, with the same arguments and the same exit codes.
+
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::ExitStatus;
+
+use clap::Args;
+
+use super::console::Console;
+use super::ending::{Ending, listen_for_ctrl_c};
+use crate::ipopt::InGoodOrder;
+use crate::{Error, Result, ipopt, replay};
+
+/// Arguments that Python reads.
+#[derive(Debug, Args)]
+pub(super) struct PythonArguments {
+    /// NAME.plan.npz and options of the Python package
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "ARGUMENTS")]
+    arguments: Vec<OsString>,
+}
+
+impl PythonArguments {
+    /// Whether `--json` is among them.
+    pub fn has_json(&self) -> bool {
+        self.arguments.iter().any(|argument| argument == "--json")
+    }
+
+    /// Runs `python -m MODULE` with these arguments.
+    ///
+    /// # Errors
+    /// When no Python has the package, or it cannot be run.
+    pub fn run(&self, module: &str, console: &Console) -> Result<Ending> {
+        let python = replay::python()?;
+        let mut command = replay::command(&python);
+        command.args(["-m", module]).args(&self.arguments);
+        if console.is_json() && !self.has_json() {
+            command.arg("--json");
+        }
+        if console.is_quiet() {
+            command.arg("--quiet");
+        }
+        // Ctrl-C reaches Python, too, which reports it and ends. This process waits for that.
+        listen_for_ctrl_c()?;
+        let _in_good_order = InGoodOrder::begin();
+        ending(&python, command.status().map_err(|e| Error::io(&python, e))?)
+    }
+}
+
+fn ending(python: &Path, status: ExitStatus) -> Result<Ending> {
+    match status.code() {
+        Some(code) => Ok(Ending::Code(u8::try_from(code).unwrap_or(1))),
+        None if ipopt::INTERRUPT.is_raised() => Ok(Ending::Interrupted),
+        None => Err(Error::Internal(format!(
+            "{} crashed or was killed ({status}); the system kills programs when memory runs out",
+            python.display()
+        ))),
+    }
+}
