@@ -47,7 +47,7 @@ fn help_and_usage() {
         let (code, out, _) = warpgait(folder.path(), &["terrain", command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
-    for command in ["init", "schema", "solve", "map", "check", "bench", "validate", "export"] {
+    for command in ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view"] {
         let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
@@ -181,6 +181,9 @@ fn validate_runs_python() {
 
     let (_, out, _) = validate(&["--quiet", "export", "a.plan.npz", "--to", "csv", "--json"]);
     assert_eq!(out.trim(), "-P -m warpgait.export a.plan.npz --to csv --json --quiet");
+
+    let (_, out, _) = validate(&["view", "a.plan.npz", "--html", "a.html"]);
+    assert_eq!(out.trim(), "-P -m warpgait.view a.plan.npz --html a.html");
 
     // A Python that crashes is neither "not trackable" nor an interruption.
     script(&python, "[ \"$2\" = -c ] && echo found && exit 0\nkill -s SEGV $$");

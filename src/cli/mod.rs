@@ -18,6 +18,7 @@ mod schema;
 mod solve;
 mod terrain;
 mod validate;
+mod view;
 
 use std::io::ErrorKind;
 use std::process::ExitCode;
@@ -34,6 +35,7 @@ Examples:
   warpgait solve hill.toml            plan it: hill.plan.npz and hill.svg
   warpgait check hill.plan.npz        recompute every law of the plan
   warpgait validate hill.plan.npz     replay the plan in MuJoCo
+  warpgait view hill.plan.npz         look at the plan in the browser
   warpgait export hill.plan.npz --to csv            the motion for trainers, robots and viewers
   warpgait terrain show scan.npy --spacing 0.04     draw a ground before planning on it
   warpgait map hill.toml              build and judge the warp map alone
@@ -79,6 +81,8 @@ enum Command {
     Validate(validate::ValidateArguments),
     /// Write the motion of a plan for trainers, robots and viewers (needs the Python package)
     Export(export::ExportArguments),
+    /// Show a plan in the browser, as one page to send to others (needs the Python package)
+    View(view::ViewArguments),
 }
 
 /// Runs the program with the arguments of the process.
@@ -120,6 +124,7 @@ impl Command {
         match self {
             Command::Validate(arguments) => arguments.python.has_json(),
             Command::Export(arguments) => arguments.python.has_json(),
+            Command::View(arguments) => arguments.python.has_json(),
             _ => false,
         }
     }
@@ -137,5 +142,6 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::BenchCase(arguments) => bench::case(&arguments),
         Command::Validate(arguments) => arguments.python.run("warpgait.validate", console),
         Command::Export(arguments) => arguments.python.run("warpgait.export", console),
+        Command::View(arguments) => arguments.python.run("warpgait.view", console),
     }
 }
