@@ -59,7 +59,8 @@ def formats() -> dict[str, Format]:
     return FORMATS
 
 
-def _chosen(name: str | None) -> Format:
+def chosen(name: str | None) -> Format:
+    """A format by its name; raises `InputError` with those that there are."""
     known = formats()
     if name not in known:
         what = "--to is missing" if name is None else f"--to {name}: there is no such format"
@@ -133,7 +134,7 @@ def main(words: list[str] | None = None) -> int:
             return 0
         if options.plan is None:
             raise InputError("the plan is missing: warpgait export NAME.plan.npz --to FORMAT")
-        outputs, motion = export(options.plan, _chosen(options.to), options.output, options.source, options.rate)
+        outputs, motion = export(options.plan, chosen(options.to), options.output, options.source, options.rate)
         if options.json:
             emit(json.dumps({"written": [str(path) for path in outputs], **motion.facts}, allow_nan=False))
         elif not options.quiet:

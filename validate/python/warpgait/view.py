@@ -39,15 +39,20 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def write_page(plan: Path, target: Path) -> None:
-    """Write the page of a plan; raises `InputError`."""
+def page_text(plan: Path) -> str:
+    """The page of a plan; raises `InputError`."""
     try:
         with without_opengl():
             from .viewer.page import page_of
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco numpy scipy") from error
+    return page_of(plan)
+
+
+def write_page(plan: Path, target: Path) -> None:
+    """Write the page of a plan; raises `InputError`."""
     ensure_outputs([target], [plan])
-    write_text(target, page_of(plan))
+    write_text(target, page_text(plan))
 
 
 def opened(page: Path) -> bool:
