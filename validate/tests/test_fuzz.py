@@ -10,10 +10,15 @@ import re
 import resource
 import time
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
+from conftest import WALK
+
+import warpgait
 from warpgait.errors import InputError
 from warpgait.plan import read_plan
+from warpgait.viewer.page import page_of
 
 COUNT = int(os.environ.get("WARPGAIT_FUZZ", "400"))
 MOST_SECONDS, MOST_MEMORY = 5.0, 500_000_000
@@ -103,14 +108,15 @@ def _text(text: str) -> bytes:
     return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head + text.encode("utf-32-le", "surrogatepass")
 
 
-def test_mutated_plans_are_read_or_refused(standing_plan: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(standing_plan) as archive:
+def _fuzz(source: Path, folder: Path, count: int, read: Callable[[Path], object], most_seconds: float = MOST_SECONDS) -> None:
+    """Give `read` mutations of a plan: it reads them, or refuses them with an error that names the file."""
+    with zipfile.ZipFile(source) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    whole, failures, accepted, slowest = standing_plan.read_bytes(), [], 0, 0.0
+    whole, failures, accepted, slowest = source.read_bytes(), [], 0, 0.0
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for number in range(COUNT):
+    for number in range(count):
         rng = random.Random(number)
-        path = tmp_path / "mutated.plan.npz"
+        path = folder / "mutated.plan.npz"
         if rng.randrange(4) == 0:
             path.write_bytes(_change(rng, whole, [whole]))
         else:
@@ -120,7 +126,7 @@ def test_mutated_plans_are_read_or_refused(standing_plan: Path, tmp_path: Path) 
         start = time.perf_counter()
         why = ""
         try:
-            read_plan(path)
+            read(path)
             accepted += 1
         except InputError as error:
             assert str(path) in str(error)
@@ -130,9 +136,20 @@ def test_mutated_plans_are_read_or_refused(standing_plan: Path, tmp_path: Path) 
         slowest = max(slowest, seconds)
         memory = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
         before += memory // 1024
-        if why or seconds > MOST_SECONDS or memory > MOST_MEMORY:
-            kept = path.rename(tmp_path / f"{number}.plan.npz")
+        if why or seconds > most_seconds or memory > MOST_MEMORY:
+            kept = path.rename(folder / f"{number}.plan.npz")
             failures.append(f"{kept}: {why or f'{seconds:.1f} s, {memory / 1e6:.0f} MB'}")
-    print(f"plans: {COUNT} inputs, {accepted} accepted, {len(failures)} failures, slowest {slowest:.2f} s")
+    print(f"plans: {count} inputs, {accepted} accepted, {len(failures)} failures, slowest {slowest:.2f} s")
     assert not failures, "\n".join(failures[:20])
-    assert accepted < COUNT
+    assert accepted < count
+
+
+def test_mutated_plans_are_read_or_refused(standing_plan: Path, tmp_path: Path) -> None:
+    _fuzz(standing_plan, tmp_path, COUNT, read_plan)
+
+
+def test_mutated_plans_are_shown_or_refused(tmp_path: Path) -> None:
+    """With joint angles, the map, and everything else that a page shows."""
+    plan = tmp_path / "walk.plan.npz"
+    warpgait.solve(WALK, overrides={"formulation": "warped", "horizon": 2.0}).save(plan)
+    _fuzz(plan, tmp_path, COUNT // 2, page_of, most_seconds=30.0)

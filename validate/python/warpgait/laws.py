@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ._native import check_plan
 from .criteria import Criterion, Metric
+from .errors import InputError
 
 CHECK = "check"
 
@@ -24,6 +29,24 @@ class Laws:
     def broken(self) -> list[str]:
         """Names of the laws that do not hold."""
         return [m.name for m in self.metrics if m.verdict.value]
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """A plan that breaks laws may be anything, and whatever goes wrong with it is then an `InputError` that names these laws.
+
+    What goes wrong with a plan that obeys them is a mistake of this program, and is raised as it is. Overflows are no warnings.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except InputError:
+        raise
+    except Exception as error:
+        broken = ", ".join(check(path).broken)
+        if not broken:
+            raise
+        raise InputError(f"{path}: cannot be used, and fails checks: {broken}; see `warpgait check`") from error
 
 
 def check(path: Path) -> Laws:

@@ -21,6 +21,7 @@ from ..arrays import Array, Bools
 from ..errors import InputError
 from ..files import stem_of
 from ..geometry import rotation_from_wxyz
+from ..laws import explained
 from ..model import Indices, find_model, indices, load_robot
 from ..openloop import inverse_dynamics, joint_motion, rolled_postures
 from ..plan import Plan
@@ -153,6 +154,11 @@ def _bodies(model: Any, index: Indices, qpos: Array, qvel: Array) -> _Bodies:
 
 def motion_of_plan(plan: Plan, rate: float | None = None) -> Motion:
     """The planned motion at `rate` Hz, by default that of the plan's samples. The robot's joint angles are found if it has a full model."""
+    with explained(plan.path):
+        return _motion_of_plan(plan, rate)
+
+
+def _motion_of_plan(plan: Plan, rate: float | None) -> Motion:
     rate = _ensure_rate(rate or round(1 / float(plan.t[1]), 6))
     planned = _planned(plan, _frames(plan.duration, rate))
     report = report_of(plan)
@@ -183,6 +189,11 @@ def motion_of_plan(plan: Plan, rate: float | None = None) -> Motion:
 
 def motion_of_replay(plan: Plan, rate: float | None = None) -> Motion:
     """The motion of the replay whose file lies beside the plan, at `rate` Hz, by default that of the replay's controller."""
+    with explained(plan.path):
+        return _motion_of_replay(plan, rate)
+
+
+def _motion_of_replay(plan: Plan, rate: float | None) -> Motion:
     file = plan.path.with_name(f"{stem_of(plan.path)}.replay.npz")
     if not file.is_file():
         raise InputError(f"{file}: there is no such file; replay the plan first: warpgait validate {plan.path.name}")

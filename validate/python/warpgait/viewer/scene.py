@@ -15,7 +15,7 @@ from ..arrays import Array, runs
 from ..criteria import LEVER
 from ..errors import InputError
 from ..files import stem_of
-from ..laws import check
+from ..laws import check, explained
 from ..motions import Motion, motion_of_plan, motion_of_replay
 from ..openloop import centroidal_residual
 from ..plan import Heightfield, Plan, read_plan
@@ -302,6 +302,11 @@ def _box_robot(plan: Plan) -> tuple[list[dict[str, Any]], list[list[float]]]:
 def scene_of(path: Any) -> dict[str, Any]:
     """Everything that the page of a plan shows; raises `InputError`."""
     plan = read_plan(path)
+    with explained(plan.path):
+        return _scene_of(plan)
+
+
+def _scene_of(plan: Plan) -> dict[str, Any]:
     archive = Archive(plan.path)
     motion = motion_of_plan(plan, RATE)
     replayed, note = _replayed(plan)
