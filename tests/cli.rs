@@ -47,7 +47,8 @@ fn help_and_usage() {
         let (code, out, _) = warpgait(folder.path(), &["terrain", command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
-    for command in ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view"] {
+    for command in ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view", "sweep"]
+    {
         let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
@@ -182,6 +183,8 @@ fn validate_runs_python() {
     let (_, out, _) = validate(&["--quiet", "export", "a.plan.npz", "--to", "csv", "--json"]);
     assert_eq!(out.trim(), "-P -m warpgait.export a.plan.npz --to csv --json --quiet");
 
+    let (_, out, _) = validate(&["sweep", "a.toml", "--shard", "1/2"]);
+    assert_eq!(out.trim(), "-P -m warpgait.sweep a.toml --shard 1/2");
     let (_, out, _) = validate(&["view", "a.plan.npz", "--html", "a.html"]);
     assert_eq!(out.trim(), "-P -m warpgait.view a.plan.npz --html a.html");
 

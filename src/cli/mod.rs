@@ -16,6 +16,7 @@ mod progress_line;
 mod python;
 mod schema;
 mod solve;
+mod sweep;
 mod terrain;
 mod validate;
 mod view;
@@ -39,6 +40,7 @@ Examples:
   warpgait export hill.plan.npz --to csv            the motion for trainers, robots and viewers
   warpgait terrain show scan.npy --spacing 0.04     draw a ground before planning on it
   warpgait map hill.toml              build and judge the warp map alone
+  warpgait sweep hills.toml           plan many scenarios, each in a process of its own
   warpgait bench table1 --quick       a few cases of the paper's Table I
   warpgait solve --help               options and examples of one command
 
@@ -83,6 +85,8 @@ enum Command {
     Export(export::ExportArguments),
     /// Show a plan in the browser, as one page to send to others (needs the Python package)
     View(view::ViewArguments),
+    /// Plan many scenarios that differ in some values (needs the Python package)
+    Sweep(sweep::SweepArguments),
 }
 
 /// Runs the program with the arguments of the process.
@@ -125,6 +129,7 @@ impl Command {
             Command::Validate(arguments) => arguments.python.has_json(),
             Command::Export(arguments) => arguments.python.has_json(),
             Command::View(arguments) => arguments.python.has_json(),
+            Command::Sweep(arguments) => arguments.python.has_json(),
             _ => false,
         }
     }
@@ -143,5 +148,6 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Validate(arguments) => arguments.python.run("warpgait.validate", console),
         Command::Export(arguments) => arguments.python.run("warpgait.export", console),
         Command::View(arguments) => arguments.python.run("warpgait.view", console),
+        Command::Sweep(arguments) => arguments.python.run("warpgait.sweep", console),
     }
 }

@@ -14,7 +14,7 @@ use crate::{Error, Result, ipopt, replay};
 /// Arguments that Python reads.
 #[derive(Debug, Args)]
 pub(super) struct PythonArguments {
-    /// NAME.plan.npz and options of the Python package
+    /// A file, and options of the Python package
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "ARGUMENTS")]
     arguments: Vec<OsString>,
 }

@@ -1,0 +1,175 @@
+"""The file of a sweep: a scenario, and the values in which its cases differ.
+
+scenario = "hill.toml"      # relative to this file
+kind = "grid"               # grid: every combination | random: `count` draws
+count = 100                 # random: how many cases
+seed = 0                    # random
+time_limit = 300.0          # s, of a case
+memory_limit = 2.0          # GiB, of a case
+keep_plans = true
+
+[values]                    # keys of the scenario
+gait.kind = ["walk", "trot"]                            # one of these
+start.yaw = { from = -1.0, to = 1.0, count = 5 }        # evenly spaced in a grid, uniform at random
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..scenario import Scenario
+
+KINDS = ("grid", "random")
+_KEYS = ("scenario", "kind", "count", "seed", "time_limit", "memory_limit", "keep_plans", "values")
+_RANGE = {"from", "to", "count"}
+_MOST_CASES = 1_000_000
+_MOST_TEXT = 1 << 20  # bytes
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scenario of a sweep."""
+
+    number: int  # from 0, in the order of the file
+    name: str  # a digest of everything that it depends on
+    values: Mapping[str, Any]  # by dotted key
+
+
+@dataclass(frozen=True)
+class Range:
+    """Numbers from one to another."""
+
+    first: float
+    last: float
+    count: int | None  # in a grid
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is to be planned."""
+
+    path: Path
+    scenario: Path
+    kind: str
+    count: int  # random
+    seed: int
+    time_limit: float  # s
+    memory_limit: float  # GiB
+    keep_plans: bool
+    values: Mapping[str, list[Any] | Range]
+
+    def cases(self) -> list[Case]:
+        """All cases, the same every time. Raises `InputError`."""
+        scenario = Scenario.read(self.scenario)
+        known = scenario.to_dict()
+        files = [known.get(table, {}).get("file") for table in ("terrain", "robot")]
+        digests = [
+            hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file is not None and Path(file).is_file()
+        ]
+        base = json.dumps([known, digests], sort_keys=True, default=str)
+        drawn = self._grid() if self.kind == "grid" else self._random()
+        found = []
+        for number, values in enumerate(drawn):
+            content = f"{base}\n{json.dumps(values, sort_keys=True, default=str)}"
+            found.append(Case(number, hashlib.sha256(content.encode()).hexdigest()[:16], values))
+        return found
+
+    def _grid(self) -> Iterator[dict[str, Any]]:
+        each = [v if isinstance(v, list) else np.linspace(v.first, v.last, v.count or 2).tolist() for v in self.values.values()]
+        if math.prod(len(values) for values in each) > _MOST_CASES:
+            raise InputError(f"{self.path}: values: more than {_MOST_CASES} combinations")
+        for chosen in itertools.product(*each):
+            yield dict(zip(self.values, chosen, strict=True))
+
+    def _random(self) -> Iterator[dict[str, Any]]:
+        random = np.random.default_rng(self.seed)
+        for _ in range(self.count):
+            yield {
+                key: v[int(random.integers(len(v)))] if isinstance(v, list) else float(random.uniform(v.first, v.last))
+                for key, v in self.values.items()
+            }
+
+
+def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and their values; a table of a range is a value."""
+    for key, value in table.items():
+        name = f"{path}.{key}" if path else key
+        if isinstance(value, dict) and not ("from" in value or "to" in value):
+            yield from _flat(value, name)
+        else:
+            yield name, value
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _choices(where: str, value: Any, grid: bool) -> list[Any] | Range:
+    if isinstance(value, list):
+        if not value:
+            raise InputError(f"{where}: has no value to choose from")
+        return value
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: {value!r}: expected a list of values, or {{ from = …, to = …, count = … }}")
+    if not set(value) <= _RANGE or not _number(value.get("from")) or not _number(value.get("to")):
+        raise InputError(f"{where}: a range has numbers `from` and `to`, and in a grid `count`; found {', '.join(value)}")
+    count = value.get("count")
+    if grid and (not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= _MOST_CASES):
+        raise InputError(f"{where}: count: in a grid, a range says how many values it has, 1 or more")
+    return Range(float(value["from"]), float(value["to"]), count if grid else None)
+
+
+def read(path: Path) -> Sweep:
+    """Read the file of a sweep; raises `InputError` with file, key and what is allowed."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_TEXT + 1)
+        if len(content) > _MOST_TEXT:
+            raise InputError(f"{path}: too large for a sweep")
+        table = tomllib.loads(content.decode())
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read as a sweep: {error}") from error
+    for key in table:
+        if key not in _KEYS:
+            raise InputError(f"{path}: {key}: unknown key; allowed here: {', '.join(_KEYS)}")
+
+    def limited(key: str, default: float, low: float, high: float, whole: bool = False) -> float:
+        value = table.get(key, default)
+        if not _number(value) or not low <= value <= high or (whole and not isinstance(value, int)):
+            raise InputError(f"{path}: {key}: {value!r}: expected a {'whole ' if whole else ''}number from {low:g} to {high:g}")
+        return float(value)
+
+    kind, scenario, keep = table.get("kind", "grid"), table.get("scenario"), table.get("keep_plans", True)
+    if kind not in KINDS:
+        raise InputError(f"{path}: kind: {kind!r}: expected {' or '.join(KINDS)}")
+    if not isinstance(scenario, str):
+        raise InputError(f"{path}: scenario: expected the name of a scenario file, relative to this file")
+    if not isinstance(keep, bool):
+        raise InputError(f"{path}: keep_plans: {keep!r}: expected true or false")
+    if kind == "random" and "count" not in table:
+        raise InputError(f"{path}: count: is missing; how many cases to draw")
+    values = table.get("values")
+    if not isinstance(values, dict) or not values:
+        raise InputError(f"{path}: values: expected a table with keys of the scenario, each with what to choose from")
+    return Sweep(
+        path=path,
+        scenario=path.parent / scenario,
+        kind=kind,
+        count=int(limited("count", 1, 1, _MOST_CASES, whole=True)),
+        seed=int(limited("seed", 0, 0, 2**63, whole=True)),
+        time_limit=limited("time_limit", 300.0, 1.0, 1e6),
+        memory_limit=limited("memory_limit", 2.0, 0.1, 1024.0),
+        keep_plans=keep,
+        values={key: _choices(f"{path}: values.{key}", value, kind == "grid") for key, value in _flat(values)},
+    )
