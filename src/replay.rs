@@ -105,7 +105,7 @@ impl Verdict {
 /// A metric of the report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metric {
-    /// "check", "open loop", or the name of the replay.
+    /// "check", "open loop", the name of the replay, or "robust".
     #[serde(default)]
     pub layer: String,
     /// What is measured.
@@ -140,7 +140,7 @@ pub struct Tracked {
     pub verdict: Verdict,
     /// The first metric that decides the verdict, in words; none for a plan that passes.
     pub first_failure: Option<Incident>,
-    /// The laws, and the metrics of the open loop and of every replay, in the order of the report.
+    /// The laws, and the metrics of the open loop, of every replay and of the worlds that differ, in the order of the report.
     pub metrics: Vec<Metric>,
     /// Wall time of the validation without the start of Python, s.
     pub seconds: f64,
@@ -154,6 +154,8 @@ struct Report {
     check: Layer,
     open_loop: Layer,
     replays: Vec<Layer>,
+    #[serde(default)]
+    robust: Option<Layer>,
     seconds: f64,
 }
 
@@ -174,7 +176,8 @@ impl Tracked {
             serde_json::from_slice(report).map_err(|e| format!("report of the replay: {e}"))?;
         let named = |layer: Layer, name: &str| Layer { name: Some(name.into()), ..layer };
         let fixed = [named(report.check, "check"), named(report.open_loop, "open loop")];
-        let metrics = fixed.into_iter().chain(report.replays).flat_map(|layer| {
+        let robust = report.robust.map(|layer| named(layer, "robust"));
+        let metrics = fixed.into_iter().chain(report.replays).chain(robust).flat_map(|layer| {
             let name = layer.name.unwrap_or_default();
             layer.metrics.into_iter().map(move |metric| Metric { layer: name.clone(), ..metric })
         });
@@ -210,16 +213,18 @@ mod tests {
                 "check": {{"metrics": [{}]}},
                 "open_loop": {{"metrics": [{}]}},
                 "replays": [{{"name": "closed loop", "verdict": "fail", "metrics": [{}, {}], "incidents": []}},
-                            {{"name": "closed loop, steps of 1 ms", "verdict": "fail", "metrics": [{}]}}]}}"#,
+                            {{"name": "closed loop, steps of 1 ms", "verdict": "fail", "metrics": [{}]}}],
+                "robust": {{"metrics": [{}], "worlds": []}}}}"#,
             metric("newton_rms", "pass"),
             metric("peak joint speed", "marginal"),
             metric("feet", "pass"),
             metric("slip", "fail"),
             metric("fall", "fail"),
+            metric("worlds that are tracked", "marginal"),
         );
         let found = Tracked::read(text.as_bytes()).unwrap();
         assert_eq!(found.verdict, Verdict::Fail);
-        assert_eq!(found.metrics.len(), 5);
+        assert_eq!(found.metrics.len(), 6);
         assert_eq!(found.metrics[0].layer, "check");
         let first = found.first_failing().unwrap();
         assert_eq!((first.layer.as_str(), first.name.as_str()), ("closed loop", "slip"));

@@ -29,8 +29,11 @@ def test_a_good_plan_gives_three_files_and_exit_code_0(
     assert report["verdict"] == "pass" and report["first_failure"] is None
     assert [t["name"] for t in report["replays"]] == ["closed loop", "closed loop, steps of 1 ms"]
     assert len(report["check"]["metrics"]) > 40 and report["settings"]["quick"] is False
+    worlds = report["robust"]["worlds"]
+    assert len(worlds) == 12 and all(world["tracked"] for world in worlds), worlds
+    assert report["robust"]["metrics"][0]["value"] == 100
     page = (tmp_path / "walk.report.html").read_text()
-    assert "The robot tracks this plan." in page and "http" not in page.replace("http-equiv", "")
+    assert "The robot tracks this plan." in page and "sensor noise" in page and "http" not in page.replace("http-equiv", "")
     with np.load(tmp_path / "walk.replay.npz") as replay:
         K = len(replay["t"])
         assert replay["q"].shape == replay["qd"].shape == replay["tau"].shape == (K, 12)
@@ -44,6 +47,7 @@ def test_a_bad_plan_gives_exit_code_1_and_the_reason(walk_plan: Path, tmp_path: 
     said = capsys.readouterr().out
     assert "check: newton_rms" in said and "unexplained force" in said and "left out" in said
     report = json.loads((tmp_path / "weak.report.json").read_text())
+    assert report["robust"] is None
     assert report["trackable"] is False and [t["name"] for t in report["replays"]] == ["closed loop"]
     # The first metric that decides, in the order of the report.
     assert report["first_failure"]["what"].startswith("check: spline_forces")
@@ -92,7 +96,7 @@ def test_a_bug_is_not_a_verdict(
 
 
 def test_a_closed_standard_output_does_not_change_the_verdict(walk_plan: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path), "--no-pictures"]
+    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--quick"]
     run = subprocess.Popen([*command], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None and run.stderr is not None
     run.stdout.close()
@@ -105,14 +109,14 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
     walk_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("MUJOCO_GL", "no-such-backend")
-    assert main([str(walk_plan), "-o", str(tmp_path)]) == 0
+    assert main([str(walk_plan), "-o", str(tmp_path), "--quick"]) == 0
     assert "libegl1" in capsys.readouterr().err
     assert "libegl1" in (tmp_path / "walk.report.html").read_text()
 
 
 def test_a_missing_opengl_loses_only_the_pictures(walk_plan: Path, tmp_path: Path) -> None:
     """With this setting, MuJoCo itself cannot be imported."""
-    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path)]
+    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path), "--quick"]
     environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -123,13 +127,13 @@ def test_without_ffmpeg_there_is_a_message_and_no_film(
     walk_plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(film, "ffmpeg", lambda: None)
-    assert main([str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--video"]) == 0
+    assert main([str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--quick", "--video"]) == 0
     assert "ffmpeg" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.mp4"))
 
 
 def test_a_still_shows_the_whole_walk(walk_plan: Path, tmp_path: Path) -> None:
-    assert main([str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--still"]) == 0
+    assert main([str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--quick", "--still"]) == 0
     picture = (tmp_path / "walk.png").read_bytes()
     columns, rows = struct.unpack(">II", picture[16:24])
     assert (columns, rows) == film.STILL_SIZE

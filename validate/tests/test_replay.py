@@ -35,7 +35,7 @@ def test_the_ground_is_where_the_plan_has_it(spacing: float) -> None:
 
 
 def test_forces_of_a_standing_robot_carry_its_weight(standing_plan: Path) -> None:
-    found = validate(read_plan(standing_plan), Settings(check=False))
+    found = validate(read_plan(standing_plan), Settings(check=False, robust=False))
     assert found.verdict is Verdict.PASS
     force = found.trials[0].replay.force[100:].sum(1).mean(0)
     assert force == pytest.approx([0, 0, found.plan.weight], abs=0.01 * found.plan.weight)
@@ -62,13 +62,13 @@ def steep_plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_adhesive_feet_hold_on_a_slope_where_others_slide(steep_plan: Path, tmp_path: Path) -> None:
     plan = read_plan(steep_plan)
-    found = validate(plan, Settings(check=False))
+    found = validate(plan, Settings(check=False, robust=False))
     assert found.trials[0].verdict is Verdict.PASS, [m for m in found.trials[0].metrics if m.verdict]
     total = found.trials[0].replay.force[100:].sum(1).mean(0)  # without the adhesion, the rest carries the weight
     assert total == pytest.approx([0, 0, plan.weight], abs=0.02 * plan.weight)
 
     plain = crawl.altered(steep_plan, tmp_path / "plain.plan.npz", lambda a: a.update(foot_adhesive=np.zeros(4, bool)))
-    assert validate(read_plan(plain), Settings(check=False)).verdict is Verdict.FAIL
+    assert validate(read_plan(plain), Settings(check=False, robust=False)).verdict is Verdict.FAIL
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_a_pulling_foot_reaches_a_wall_3_mm_deeper_than_planned(wall_plan: Path)
     y = ground.origin[1] + ground.spacing[1] * np.arange(rows) - hold[1]
     dent = 0.003 / plan.foot_normal[-1, 0, 2] * np.exp(-(x**2 + y[:, None] ** 2) / 0.08**2)
     dented = Heightfield(ground.heights - dent, ground.origin, ground.spacing)
-    found = validate(replace(plan, terrain=dented), Settings(check=False))
+    found = validate(replace(plan, terrain=dented), Settings(check=False, robust=False))
     assert found.trials[0].incidents == []
     assert found.trials[0].verdict is not Verdict.FAIL
     end = found.trials[0].replay.force[-100:, 0].mean(0) @ plan.foot_normal[-1, 0]
@@ -100,7 +100,7 @@ def test_a_pulling_foot_reaches_a_wall_3_mm_deeper_than_planned(wall_plan: Path)
 
 def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan: Path) -> None:
     push = (0.4, 0.5, 0.0, 900.0, 0.0)
-    found = validate(read_plan(standing_plan), Settings(check=False, disturbance=Disturbance(push=push)))
+    found = validate(read_plan(standing_plan), Settings(check=False, robust=False, disturbance=Disturbance(push=push)))
     assert found.verdict is Verdict.FAIL
     first = found.first_failure
     assert first is not None and first.time is not None and 0.4 < first.time < 1.0
@@ -111,7 +111,7 @@ def test_a_simulation_that_blows_up_is_a_failure_not_a_crash(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     disturbance = Disturbance(push=(0.4, 0.1, 0.0, 1e12, 0.0))
-    found = validate(read_plan(standing_plan), Settings(check=False, disturbance=disturbance))
+    found = validate(read_plan(standing_plan), Settings(check=False, robust=False, disturbance=disturbance))
     assert found.verdict is Verdict.FAIL
     assert found.first_failure is not None and "blew up" in found.first_failure.what
     assert list(tmp_path.iterdir()) == []  # no log file of MuJoCo
@@ -121,7 +121,7 @@ def test_a_rough_raw_terrain_is_replayed_and_counts(standing_plan: Path) -> None
     plan = read_plan(standing_plan)
     rough = plan.terrain.heights + 0.03 * np.sign(np.random.default_rng(0).standard_normal(plan.terrain.heights.shape))
     raw = Heightfield(rough, plan.terrain.origin, plan.terrain.spacing)
-    found = validate(replace(plan, terrain_raw=raw), Settings(check=False))
+    found = validate(replace(plan, terrain_raw=raw), Settings(check=False, robust=False))
     assert [t.name for t in found.trials] == ["closed loop", "closed loop, steps of 1 ms", "closed loop, raw terrain"]
     assert found.trials[0].verdict is Verdict.PASS
     assert found.verdict is not Verdict.PASS

@@ -58,6 +58,5 @@ class GroundContacts:
         force = np.asarray(on_foot @ (sign * (local[:, None] @ frame)[:, 0]), float)
         for e, actuator in self.adhesion:
             if on_foot[e].any():  # the actuator presses the foot onto the ground; without it, the ground's net force remains
-                normal = (sign * frame[:, 0])[on_foot[e]].sum(0)
-                force[e] -= data.actuator_force[actuator] * normal / np.linalg.norm(normal)
+                force[e] -= data.actuator_force[actuator] * (sign * frame[:, 0])[on_foot[e]].mean(0)
         return force, stray

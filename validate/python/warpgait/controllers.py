@@ -5,6 +5,7 @@ It uses a robot model of its own, the planned one, with measured positions and v
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,32 +13,38 @@ import daqp
 import mujoco
 import numpy as np
 
-from .arrays import Array, Bools, Integers, runs
-from .geometry import rotation_vector, smootherstep
+from .arrays import Array, Bools, Integers
+from .footing import StepOver, TouchDown, swing_progress
+from .geometry import rotation_vector
 from .model import Indices
+from .observer import Moment, Observer
 from .reference import Reference
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
 FRICTION_USED = 0.95  # fraction of the friction that the controller uses; at the edge of the cone a foot slides
+LATENCY = 1  # control steps from a measurement until the torques that it leads to act
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
-EDGE_WINDOW = (0.05, 0.5)  # fractions of a swing between which a contact is an edge, not lift-off or touch-down
-EARLY = 0.6  # fraction of a swing after which a contact is the touch-down: the foot stands
 
 _UNBOUNDED = 1e30  # DAQP's infinity
 _EQUALITY = 5  # DAQP's flags: active and immutable
 
 
-def friction_cones(normal: Array, friction: float) -> Array:
-    """Rows (..., EDGES + 1, 3) for normals (..., 3): ν cos(π/EDGES) n − s for directions s around n, then n itself.
+def usable(friction: float) -> float:
+    """The slope of the controller's friction pyramid, which is inside the cone of `friction`."""
+    return FRICTION_USED * float(np.cos(np.pi / EDGES)) * friction
 
-    Row · force is zero or more for every row if the force is inside the pyramid.
+
+def friction_cones(normal: Array, friction: float) -> Array:
+    """Rows (..., EDGES + 1, 3) for normals (..., 3): ν n − s for directions s around n, then n itself.
+
+    Row · force is zero or more for every row if the force is inside the pyramid of slope ν = `friction`.
     """
     tx = np.cross([0.0, 1.0, 0.0], normal)
     tx /= np.linalg.norm(tx, axis=-1, keepdims=True)
     ty = np.cross(normal, tx)
     angles = 2 * np.pi * np.arange(EDGES)[:, None] / EDGES
     around = np.cos(angles) * tx[..., None, :] + np.sin(angles) * ty[..., None, :]
-    inner = friction * np.cos(np.pi / EDGES) * normal[..., None, :]
+    inner = friction * normal[..., None, :]
     return np.concatenate([inner - around, normal[..., None, :]], axis=-2)
 
 
@@ -51,8 +58,8 @@ class Gains:
     """
 
     com: tuple[float, float] = (100.0, 20.0)
-    rotation: tuple[float, float] = (20.0, 9.0)
-    swing: tuple[float, float] = (350.0, 32.0)
+    rotation: tuple[float, float] = (100.0, 20.0)
+    swing: tuple[float, float] = (1000.0, 52.0)
     stance_damping: float = 20.0
     reach_down: float = 0.01  # m below the plan, the target of a stance foot that does not touch the ground yet …
     seek: tuple[float, float] = (0.25, 0.05)  # m/s, m: … and how fast and how far it goes on down until it touches
@@ -65,54 +72,6 @@ class Gains:
     weight_force: float = 3e-3
     weight_acceleration: float = 1e-3
     least_normal_force: float = 5.0  # N, on feet that are not adhesive or do not touch the ground yet
-
-
-def swing_progress(reference: Reference) -> Array:
-    """Fraction (K, E) of the current swing that is over; zero in stance."""
-    progress: Array = np.zeros(reference.contact.shape)
-    for e in range(progress.shape[1]):
-        for first, end in runs(~reference.contact[:, e]):
-            progress[first:end, e] = np.arange(end - first) / (end - first)
-    return progress
-
-
-class StepOver:
-    """Lifts a foot that touches something in the first half of its swing: an edge that the plan does not know, which would hold it back.
-
-    Where the ground is as planned, no foot touches it then, and nothing changes.
-    """
-
-    def __init__(self, reference: Reference, speed: float, limit: float) -> None:
-        """`speed` m/s and `limit` m of the rise."""
-        self._contact, self._progress = reference.contact, swing_progress(reference)
-        self._step, self._speed, self._limit = speed * float(reference.t[1]), speed, limit
-        self._met = np.zeros(reference.contact.shape[1], bool)
-        self._risen = np.zeros(reference.contact.shape[1])
-
-    def update(self, k: int, touching: Bools) -> tuple[Array, Array]:
-        """Rise (E,) m of the feet's targets along the normal, and its speed (E,) m/s. It is zero again at touch-down. Call once a step."""
-        s, stance = self._progress[k], self._contact[k]
-        self._met = ~stance & (self._met | (touching & (s > EDGE_WINDOW[0]) & (s < EDGE_WINDOW[1])))
-        rising = self._met & (self._risen < self._limit)
-        self._risen = np.where(stance, 0.0, self._risen + rising * self._step)
-        return (1 - smootherstep(s)) * self._risen, np.where(rising, self._speed, 0.0)
-
-
-class TouchDown:
-    """Feet that meet the ground earlier or later than planned, because it is higher or lower than in the plan."""
-
-    def __init__(self, progress: Array, step: float, speed: float, limit: float) -> None:
-        """`progress` (K, E): fraction of the current swing that is over; `speed` m/s and `limit` m of the search downward."""
-        self._progress, self._step, self._speed, self._limit = progress, step, speed, limit
-        self.early = np.zeros(progress.shape[1], bool)  # stands before the plan has it stand
-        self.sought = np.zeros(progress.shape[1])  # m below the plan's foothold
-
-    def update(self, k: int, contact: Bools, touching: Bools) -> None:
-        """`contact` (E,): which feet the plan has standing at control step k. Call once a step."""
-        self.early = ~contact & (self.early | (touching & (self._progress[k] > EARLY)))
-        seeking = contact & ~touching
-        further = np.minimum(self.sought + self._speed * self._step, self._limit)
-        self.sought = np.where(seeking, further, np.where(contact, self.sought, 0.0))
 
 
 class WholeBody:
@@ -128,13 +87,12 @@ class WholeBody:
         index: Indices,
         reference: Reference,
         friction: float,
-        pull: Array,
-        preload: Array,
+        adhesion: Array,
         gains: Gains | None = None,
     ) -> None:
-        """`pull` (E,): how hard a foot may pull, N; `preload` (E,): adhesion that adds to the normal force in the friction law, N."""
+        """`adhesion` (K, E) N: how strongly each foot sticks, which adds to the normal force in the friction law."""
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
-        self.friction, self.pull, self.preload = FRICTION_USED * friction, pull, preload
+        self.friction, self.adhesion = usable(friction), adhesion
         self.mass = float(model.body_mass.sum())
         self.failures = 0
         nv, E = model.nv, len(index.feet)
@@ -147,31 +105,52 @@ class WholeBody:
         self._cones = friction_cones(reference.normal, self.friction)
         self._cones_in_the_air = friction_cones(reference.normal, FRICTION_IN_THE_AIR)
         self._last = np.zeros((E, 3))
+        self._acceleration = np.zeros(nv)
+        self._velocity: Array | None = None
+        self._data, self._period = mujoco.MjData(model), float(reference.t[1])
+        self._moments: deque[Moment] = deque(maxlen=LATENCY + 1)
+        self.observer = Observer(model, index, self._period)
         self._step_over = StepOver(reference, *self.gains.step_over)
         self._touch_down = TouchDown(swing_progress(reference), float(reference.t[1]), *self.gains.seek)
 
-    def torque(self, k: int, data: Any, touching: Bools) -> Array:
-        """Motor torques (E, 3) N m at control step k for the measured state in `data` (kinematics and bias up to date).
+    def torque(self, k: int, qpos: Array, qvel: Array, touching: Bools) -> Array:
+        """Motor torques (E, 3) N m at control step k for the measured positions (nq,) and velocities (nv,), and the feet (E,) that touch.
 
-        Without a solution, the torques of the step before are kept.
-        Unknowns: accelerations q̈ (nv,), then the forces (3,) of each foot in stance.
+        They act a control step later, so they are computed for the state that the robot will have then. Without a solution, the torques of
+        the step before are kept. Unknowns: accelerations q̈ (nv,), then the forces (3,) of each foot in stance.
         """
+        if self._velocity is not None and len(self._moments) == self._moments.maxlen:
+            self.observer.update(qvel - self._velocity, self._moments[0], touching)
+        self._velocity = qvel.copy()
+        data = self._predict(qpos, qvel)
         mujoco.mj_fullM(self.model, data, self._M)
         bias = data.qfrc_bias - data.qfrc_passive
         self._touch_down.update(k, self.reference.contact[k], touching)
         stance = np.flatnonzero(self.reference.contact[k] | self._touch_down.early)
         weights = np.array(self._base_tasks(k, data, bias) + self._foot_tasks(k, data, touching))
         H, gradient = self._objective(k, stance, weights)
-        C, lower, upper = self._constraints(k, stance, touching, bias)
+        C, lower, upper = self._constraints(k, stance, touching, bias - self.observer.generalized)
         sense = np.zeros(len(C), np.int32)
         sense[:6] = _EQUALITY
         x, _, flag, _ = daqp.solve(H, gradient, C, upper, lower, sense)
-        if flag < 1 or not np.isfinite(x).all():
+        if flag >= 1 and np.isfinite(x).all():
+            motors = self.index.qvel.ravel()
+            self._last = (C[6 : 6 + len(motors)] @ x + (bias - self.observer.generalized)[motors]).reshape(-1, 3)
+            self._acceleration = x[: self.model.nv]
+        else:
             self.failures += 1
-            return self._last
-        motors = self.index.qvel.ravel()
-        self._last = (C[6 : 6 + len(motors)] @ x + bias[motors]).reshape(-1, 3)
+        self._moments.append(Moment(self._M.copy(), bias, self._contact_jacobian.copy(), self._last, touching.copy()))
         return self._last
+
+    def _predict(self, qpos: Array, qvel: Array) -> Any:
+        """Kinematics and bias a control step after the measurement, with the accelerations that the last torques should cause."""
+        data = self._data
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        data.qvel[:] += self._period * self._acceleration
+        mujoco.mj_integratePos(self.model, data.qpos, (qvel + data.qvel) / 2, self._period)
+        mujoco.mj_fwdPosition(self.model, data)
+        mujoco.mj_fwdVelocity(self.model, data)
+        return data
 
     def _base_tasks(self, k: int, data: Any, bias: Array) -> list[float]:
         """Fill the rows of A q̈ = b for the center of mass and the trunk's orientation; returns their weights."""
@@ -180,9 +159,11 @@ class WholeBody:
         jacobian = self._M[:3] / self.mass
         self._A[:3] = jacobian
         drift = bias[:3] / self.mass + self.model.opt.gravity
-        error, rate = ref.com[k] - data.subtree_com[index.base], ref.com_velocity[k] - jacobian @ v
-        self._b[:3] = ref.com_acceleration[k] + g.com[0] * error + g.com[1] * rate - drift
         R = data.xmat[index.base].reshape(3, 3)
+        com = data.subtree_com[index.base]
+        center = self.observer.locate(R, com - data.xpos[index.base])
+        error, rate = ref.com[k] - com - center, ref.com_velocity[k] - jacobian @ v
+        self._b[:3] = ref.com_acceleration[k] + g.com[0] * error + g.com[1] * rate - drift
         turn, spin = rotation_vector(R.T @ ref.rotation[k]), R.T @ ref.angular_velocity[k] - v[3:6]
         self._b[3:6] = R.T @ ref.angular_acceleration[k] + g.rotation[0] * turn + g.rotation[1] * spin
         return [g.weight_com] * 3 + [g.weight_rotation] * 3
@@ -248,7 +229,7 @@ class WholeBody:
             if not touching[e]:  # relying on a force that is not there (push, pull or friction) would throw the leg
                 upper[first + EDGES] = g.touch_force
                 C[first : first + EDGES, force] = self._cones_in_the_air[k, e, :EDGES]
-            elif self.pull[e] > 0:
-                lower[first : first + EDGES] = -self.friction * np.cos(np.pi / EDGES) * self.preload[e]
-                lower[first + EDGES] = -self.pull[e]
+            else:
+                lower[first : first + EDGES] = -self.friction * self.adhesion[k, e]
+                lower[first + EDGES] -= self.adhesion[k, e]
         return C, lower, upper

@@ -11,7 +11,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from .children import child
 from .plan import Heightfield
 from .scene import build_world
 from .validation import Validation
@@ -133,12 +133,9 @@ def _write_scene(v: Validation, job: _Job, folder: Path) -> None:
 
 def _render_with(backend: str, job: str, seconds: float) -> str | None:
     """Run `render.py` with one OpenGL; returns the last line of its error, or None."""
-    # An empty entry of the path would be the working folder.
-    path = os.pathsep.join(folder for folder in sys.path if os.path.isabs(folder))
-    environment = dict(os.environ, MUJOCO_GL=backend, PYTHONPATH=path)
-    command = [sys.executable, "-P", "-m", "warpgait.render", job]
+    command, environment = child("warpgait.render", backend)
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=seconds, check=False)
+        done = subprocess.run([*command, job], env=environment, capture_output=True, text=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
         raise FilmError(f"Rendering timed out after {seconds:.0f} s.") from None
     if done.returncode == 0:

@@ -21,7 +21,7 @@ from .plan import Plan
 from .reference import Reference
 from .replay import Incident, Replay
 
-OPEN_LOOP = "open loop"
+OPEN_LOOP, ROBUST = "open loop", "robust"  # layers
 FORCE_WINDOW = 0.02  # s: forces are averaged over this time, so that an impact of 2 ms does not hide the rest
 PATIENCE = 0.05  # s: a wrong contact or a saturated motor is an incident after this time
 SLIP_INCIDENT = 0.02  # m of slip in one stance

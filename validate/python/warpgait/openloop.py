@@ -109,7 +109,7 @@ def centroidal_residual(plan: Plan) -> Array:
 def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, str]]:
     """Postures (N, nq) that put a part other than a foot deeper than `TOUCH_DEPTH` into the ground of `world`: (sample, body)."""
     data = mujoco.MjData(world)
-    ground, feet = world.geom("ground").id, set(index.geom)
+    ground, feet = world.geom("ground").id, {world.geom(foot).id for foot in index.feet}
     found = []
     for k in range(len(qpos)):
         data.qpos[:] = qpos[k]

@@ -131,6 +131,25 @@ def _trial(trial: Trial) -> list[str]:
     return parts
 
 
+def _worlds(v: Validation) -> list[str]:
+    """The worlds that differ from the plan's: which are tracked, and the metric that comes closest to its wider limit."""
+    if not v.attempts:
+        return []
+    word = max(m.verdict for m in v.robust_metrics).word
+    rows = []
+    for a in v.attempts:
+        c, tracked = a.worst.criterion, ("pass", "yes") if a.tracked else ("fail", "no")
+        rows.append(
+            f'<tr><td>{escape(a.world)}</td><td class="{tracked[0]}">{tracked[1]}</td><td>{escape(c.name)}</td>'
+            f'<td class="n">{a.worst.value:.4g}</td><td class="unit">{escape(c.unit)}</td><td class="n">{c.sign} {c.marginal:g}</td></tr>'
+        )
+    head = (
+        '<tr><th></th><th>tracked</th><th>closest to its limit</th><th class="n">value</th><th></th><th class="n">limit</th></tr>'
+    )
+    table = f'<div class="scroll"><table>{head}{"".join(rows)}</table></div>'
+    return [f'<h2>Worlds that differ from the plan\'s: <span class="{word}">{word}</span></h2>{_table(v.robust_metrics)}{table}']
+
+
 def as_html(v: Validation, pictures: list[tuple[float, bytes]], picture_note: str | None) -> str:
     """The page; `pictures` are (time s, PNG bytes)."""
     parts = _head(v)
@@ -145,6 +164,7 @@ def as_html(v: Validation, pictures: list[tuple[float, bytes]], picture_note: st
     parts.append(f"<h2>Open loop: postures, torques, the plan's own laws</h2>{_table(v.metrics)}")
     for trial in v.trials:
         parts += _trial(trial)
+    parts += _worlds(v)
     parts.append(f"<h2>{_title(v.shown.name)}, over time in s</h2>")
     parts += _plots(v, v.shown)
     return "\n".join(parts) + "</html>\n"

@@ -14,6 +14,7 @@ from .criteria import Metric
 from .errors import REPORT_SCHEMA
 from .files import replacing, write_text
 from .replay import Incident
+from .robust import Attempt
 from .validation import Trial, Validation
 
 
@@ -45,6 +46,17 @@ def _trial(t: Trial) -> dict[str, Any]:
     }
 
 
+def _attempt(a: Attempt) -> dict[str, Any]:
+    return {"name": a.world, "tracked": a.tracked, "worst": _metric(a.worst)}
+
+
+def _robust(v: Validation) -> dict[str, Any] | None:
+    """None where these replays were left out."""
+    if not v.attempts:
+        return None
+    return {"metrics": [_metric(m) for m in v.robust_metrics], "worlds": [_attempt(a) for a in v.attempts]}
+
+
 def as_dict(v: Validation) -> dict[str, Any]:
     """The report as plain data."""
     d = v.settings.disturbance
@@ -64,7 +76,12 @@ def as_dict(v: Validation) -> dict[str, Any]:
             "mujoco": mujoco.__version__,
             "friction": v.plan.robot.friction if d.friction is None else d.friction,
             "mass_factor": d.mass_factor,
+            "body_factor": d.body_factor,
+            "com_shift": list(d.com_shift),
+            "payload": None if d.payload is None else list(d.payload),
+            "drives": d.drives,
             "terrain_shift": list(d.terrain_shift),
+            "terrain_tilt": list(d.terrain_tilt),
             "push": None if d.push is None else list(d.push),
             "noise": d.noise,
             "delay": d.delay,
@@ -73,6 +90,7 @@ def as_dict(v: Validation) -> dict[str, Any]:
         "check": {"metrics": [_metric(m) for m in v.laws.metrics]},
         "open_loop": {"metrics": [_metric(m) for m in v.metrics]},
         "replays": [_trial(t) for t in v.trials],
+        "robust": _robust(v),
         "seconds": round(v.seconds, 3),
     }
 

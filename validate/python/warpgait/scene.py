@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
+from scipy.spatial.transform import Rotation
 
 from .arrays import Array
 from .model import adhesion_name, load_spec
@@ -18,6 +19,12 @@ MARGIN = 0.5  # m: beyond the heightfield, the ground goes on by this much, leve
 BASE_THICKNESS = 0.5  # m of ground below the lowest point, which MuJoCo asks for
 LEAST_RISE = 1e-3  # m between lowest and highest point, so that a level terrain is not normalized to 0/0
 TORSIONAL_FRICTION, ROLLING_FRICTION = 0.02, 0.01  # m, of a foot, as MuJoCo defines them
+PAYLOAD, PAYLOAD_RADIUS = "payload", 0.1  # the body, and its radius of gyration, m
+# Drives at `Disturbance.drives` = 1. A motor of twice the torque has about twice the rotor inertia, seen from the joint.
+ROTOR_INERTIA = 1e-4  # kg m² for each N m of the torque limit
+DRIVE_FRICTION = 0.005  # of the torque limit
+# Of friction, relative to the normal force. MuJoCo's friction is soft: at 10, feet on a wall creep by 6 mm/s without reaching the cone.
+FRICTION_STIFFNESS = 100.0
 GROUND_COLOR = [0.55, 0.5, 0.42, 1.0]
 ZENITH_COLOR, HORIZON_COLOR = [0.72, 0.82, 0.92], [0.95, 0.96, 0.98]
 
@@ -34,8 +41,8 @@ def refine(terrain: Heightfield, cell: float = CELL) -> Heightfield:
     return Heightfield(heights, terrain.origin, np.array([x[-1], y[-1]]) / (counts - 1))
 
 
-def _add_ground(spec: Any, terrain: Heightfield, shift: tuple[float, float, float]) -> None:
-    """The terrain with a level margin around it, as a heightfield, moved by `shift` m."""
+def _add_ground(spec: Any, terrain: Heightfield, disturbance: Disturbance, pivot: Array) -> None:
+    """The terrain with a level margin around it, as a heightfield, moved, and tilted about `pivot` (3,) m, as the disturbance has it."""
     margin = np.ceil(MARGIN / terrain.spacing).astype(int)
     heights = np.pad(terrain.heights, ((margin[1], margin[1]), (margin[0], margin[0])), mode="edge")
     low, high = float(heights.min()), float(heights.max())
@@ -45,11 +52,14 @@ def _add_ground(spec: Any, terrain: Heightfield, shift: tuple[float, float, floa
     size = [*half, rise, BASE_THICKNESS]
     field = spec.add_hfield(name="terrain", nrow=heights.shape[0], ncol=heights.shape[1], size=size)
     field.userdata = ((heights - low) / rise).astype(np.float32).ravel().tolist()
+    tilt = Rotation.from_euler("xy", disturbance.terrain_tilt, degrees=True)
+    place = np.array([center[0], center[1], low]) + disturbance.terrain_shift
     spec.worldbody.add_geom(
         name="ground",
         type=mujoco.mjtGeom.mjGEOM_HFIELD,
         hfieldname="terrain",
-        pos=np.array([center[0], center[1], low]) + shift,
+        pos=pivot + tilt.apply(place - pivot),
+        quat=tilt.as_quat(scalar_first=True),
         contype=0,
         conaffinity=1,
         rgba=GROUND_COLOR,
@@ -68,13 +78,43 @@ def _add_sky(spec: Any) -> None:
     )
 
 
-def _add_adhesion(spec: Any, geom: Any, strength: float) -> None:
-    """An actuator that presses the foot `geom` onto the ground with up to `strength` N."""
-    actuator = spec.add_actuator(name=adhesion_name(geom.name), target=geom.parent.name, trntype=mujoco.mjtTrn.mjTRN_BODY)
+def _make_adhesive(spec: Any, foot: Any, strength: float) -> None:
+    """Give the geom `foot` an actuator that presses it onto the ground with up to `strength` N.
+
+    MuJoCo's adhesion acts on all geoms of a body, so the foot gets a body of its own.
+    """
+    body = foot.parent.add_body(name=f"{foot.name}_FOOT", pos=foot.pos)
+    kept = ("type", "size", "condim", "priority", "contype", "conaffinity", "friction", "solref", "solimp", "solmix", "rgba")
+    values = {key: np.copy(value) if np.ndim(value := getattr(foot, key)) else value for key in kept}
+    name = foot.name
+    spec.delete(foot)
+    body.add_geom(name=name, mass=0.0, **values)
+    actuator = spec.add_actuator(name=adhesion_name(name), target=body.name, trntype=mujoco.mjtTrn.mjTRN_BODY)
     actuator.ctrllimited = True
     actuator.ctrlrange = [0, 1]
     actuator.forcelimited = False  # the model's default is the joint motors' limit
     actuator.set_to_adhesion(strength)
+
+
+def _change_robot(spec: Any, disturbance: Disturbance) -> None:
+    """Masses, center of mass, payload and drives as the disturbance has them."""
+    base = spec.body("base")
+    total = sum(body.mass for body in spec.bodies)
+    base.ipos = np.asarray(base.ipos) + np.asarray(disturbance.com_shift) * total / base.mass
+    for body in spec.bodies:
+        factor = disturbance.body_factor * (disturbance.mass_factor if body.name == base.name else 1.0)
+        body.mass *= factor
+        body.fullinertia = np.asarray(body.fullinertia) * factor
+    if disturbance.payload is not None and disturbance.payload[0] > 0:
+        mass, *place = disturbance.payload
+        base.add_body(
+            name=PAYLOAD, pos=place, ipos=[0, 0, 0], mass=mass, inertia=[mass * PAYLOAD_RADIUS**2] * 3, explicitinertial=True
+        )
+    limits = {motor.target: motor.ctrlrange[1] for motor in spec.actuators}
+    for joint in spec.joints:
+        if joint.name in limits:
+            joint.armature += disturbance.drives * ROTOR_INERTIA * limits[joint.name]
+            joint.frictionloss += disturbance.drives * DRIVE_FRICTION * limits[joint.name]
 
 
 def world_spec(
@@ -85,25 +125,28 @@ def world_spec(
     adhesive: tuple[str, ...] = (),
     adhesion: float = 0.0,
     disturbance: Disturbance | None = None,
+    pivot: Array | None = None,
     cell: float = CELL,
 ) -> Any:
-    """Robot and terrain as an editable `MjSpec`. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N."""
+    """Robot and terrain as an editable `MjSpec`. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N.
+
+    `pivot` (3,) m is the point about which the disturbance tilts the ground.
+    """
     disturbance = disturbance or Disturbance()
     spec = load_spec(path)
     spec.option.timestep = 1 / PHYSICS_RATES[0]
     spec.option.gravity = gravity
-    _add_ground(spec, refine(terrain, cell), disturbance.terrain_shift)
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # contacts.py reads the forces as such cones have them
+    spec.option.impratio = FRICTION_STIFFNESS
+    _add_ground(spec, refine(terrain, cell), disturbance, np.zeros(3) if pivot is None else pivot)
     _add_sky(spec)
-    base = spec.body("base")
-    base.mass *= disturbance.mass_factor
-    base.fullinertia = np.asarray(base.fullinertia) * disturbance.mass_factor
+    _change_robot(spec, disturbance)
     feet = {site.name for site in spec.sites}
     mu = friction if disturbance.friction is None else disturbance.friction
-    for geom in spec.geoms:
-        if geom.name in feet:
-            geom.friction = [mu, TORSIONAL_FRICTION, ROLLING_FRICTION]
-            if geom.name in adhesive:
-                _add_adhesion(spec, geom, adhesion)
+    for geom in [geom for geom in spec.geoms if geom.name in feet]:
+        geom.friction = [mu, TORSIONAL_FRICTION, ROLLING_FRICTION]
+        if geom.name in adhesive:
+            _make_adhesive(spec, geom, adhesion)
     return spec
 
 

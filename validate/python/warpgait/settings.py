@@ -41,10 +41,15 @@ class Disturbance:
 
     friction: float | None = None  # of the ground, instead of the plan's
     mass_factor: float = 1.0  # on the mass of the base body
+    body_factor: float = 1.0  # on the masses and inertias of all bodies
+    com_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, of the robot's center of mass in the base's frame
+    payload: tuple[float, float, float, float] | None = None  # kg, and where from the base's origin in its frame, m
+    drives: float = 0.0  # multiplies the rotor inertia and the friction of the drives in scene.py
     terrain_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m
+    terrain_tilt: tuple[float, float] = (0.0, 0.0)  # degrees, about x and y, around the robot's start
     push: tuple[float, float, float, float, float] | None = None  # start s, duration s, force on the base x, y, z N
     noise: float = 0.0  # multiplies the standard deviations of sensor noise in simulation.py
-    delay: float = 0.0  # s, between measurement and control
+    delay: float = 0.0  # s, between measurement and control, beside the control step that the controller expects
     seed: int = 0  # of the noise
 
     def __post_init__(self) -> None:
@@ -54,6 +59,14 @@ class Disturbance:
             raise _refuse("friction", self.friction, "in (0, 10]")
         if not 0.1 <= self.mass_factor <= 10:
             raise _refuse("mass_factor", self.mass_factor, "in [0.1, 10]")
+        if not 0.1 <= self.body_factor <= 10:
+            raise _refuse("body_factor", self.body_factor, "in [0.1, 10]")
+        if self.payload is not None and self.payload[0] < 0:
+            raise InputError(f"--payload: the mass, {self.payload[0]:g} kg, must be zero or more")
+        if not 0 <= self.drives <= 100:
+            raise _refuse("drives", self.drives, "in [0, 100]")
+        if max(map(abs, self.terrain_tilt)) > 45:
+            raise InputError("--terrain-tilt: angles must be in [-45, 45] degrees")
         if not 0 <= self.noise <= 100:
             raise _refuse("noise", self.noise, "in [0, 100]")
         if not 0 <= self.delay <= 0.2:
@@ -71,9 +84,15 @@ class Settings:
     model: str | None = None  # full model to replay on; default: the plan's robot
     rate: float = 250.0  # Hz, of the whole-body controller
     check: bool = True  # judge the plan's file by the laws of `warpgait check` first
-    quick: bool = False  # leave out the replay with finer time steps
+    quick: bool = False  # leave out the replay with finer time steps, and those in other worlds
+    robust: bool = True  # replay in worlds that differ from the plan's, unless `disturbance` is one
     raw: bool = True  # replay on the raw heightfield as well, if the plan has one
     disturbance: Disturbance = field(default_factory=Disturbance)
+
+    @property
+    def in_other_worlds(self) -> bool:
+        """Whether to replay in worlds that differ from the plan's."""
+        return self.robust and not self.quick and self.disturbance == Disturbance()
 
     def __post_init__(self) -> None:
         """Refuse a control rate that does not divide the physics rate."""

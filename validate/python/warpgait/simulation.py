@@ -14,14 +14,14 @@ import numpy as np
 
 from .arrays import Array, Bools
 from .contacts import GroundContacts
-from .controllers import WholeBody
+from .controllers import LATENCY, WholeBody
 from .geometry import rotation_vector
 from .model import Indices, foot_of
 from .reference import Reference
 from .replay import Incident, Replay
 from .settings import Disturbance
 
-SETTLING_TIME = 0.3  # s: the robot stands at the first sample before the plan's clock starts
+SETTLING_TIME = 0.6  # s: the robot stands at the first sample before the plan's clock starts
 INITIAL_DEPTH = 5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that all touch
 TILT_LIMIT = np.deg2rad(35.0)  # between the trunk's vertical axis and the planned one; more is a fall
 OFFSET_LIMIT = 0.5  # m, of the center of mass from the planned one; more is a fall, whatever the trunk's attitude
@@ -34,26 +34,23 @@ ANGULAR_VELOCITY_NOISE = np.deg2rad(1.0)  # rad/s, base and joints
 
 
 class _Measurement:
-    """The state that the controller sees, delayed and noisy if the disturbance says so, in a model of its own."""
+    """The state that the controller sees, delayed and noisy if the disturbance says so."""
 
     def __init__(self, model: Any, disturbance: Disturbance, period: float) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
+        self.qpos, self.qvel, self.touching = np.zeros(model.nq), np.zeros(model.nv), np.zeros(0, bool)
         self.noise, self.rng = disturbance.noise, np.random.default_rng(disturbance.seed)
         self.queue: deque[tuple[Array, Array, Bools]] = deque(maxlen=round(disturbance.delay / period) + 1)
 
-    def take(self, qpos: Array, qvel: Array, touching: Bools) -> Bools:
-        """Record the true state, put the measured one into `data`, and return the measured contacts (E,)."""
+    def take(self, qpos: Array, qvel: Array, touching: Bools) -> None:
+        """Record the true state, and put the measured one into `qpos`, `qvel` and `touching`."""
         self.queue.append((qpos.copy(), qvel.copy(), touching.copy()))
-        q, v, contact = self.queue[0]
-        self.data.qpos[:], self.data.qvel[:] = q, v
+        q, v, self.touching = self.queue[0]
+        self.qpos, self.qvel = q.copy(), v.copy()
         if self.noise > 0:
             self._add_noise()
-        mujoco.mj_fwdPosition(self.model, self.data)
-        mujoco.mj_fwdVelocity(self.model, self.data)
-        return contact
 
     def _add_noise(self) -> None:
-        q, v, random = self.data.qpos, self.data.qvel, self.rng.standard_normal
+        q, v, random = self.qpos, self.qvel, self.rng.standard_normal
         q[:3] += self.noise * POSITION_NOISE * random(3)
         mujoco.mju_quatIntegrate(q[3:7], self.noise * ANGLE_NOISE * random(3), 1.0)
         q[7:] += self.noise * ANGLE_NOISE * random(len(q) - 7)
@@ -97,19 +94,24 @@ class Simulation:
         index: Indices,
         reference: Reference,
         controller: WholeBody,
+        adhesion: Array,
         qpos: Array,
         disturbance: Disturbance | None = None,
     ) -> None:
-        """The robot starts in `world` in posture `qpos` (nq,). The controller sees `own_model`, which has no contacts."""
+        """The robot starts in `world` in posture `qpos` (nq,). The controller sees `own_model`, which has no contacts.
+
+        `adhesion` (K, E) N: how strongly the feet stick.
+        """
         self._disturbance = disturbance or Disturbance()
         self._world, self._index, self._reference, self._controller = world, index, reference, controller
-        self._data = mujoco.MjData(world)
+        self._adhesion, self._data = adhesion, mujoco.MjData(world)
         self._data.qpos[:] = qpos
         self._data.qpos[2] -= INITIAL_DEPTH
         self._period = float(reference.t[1])
         self._substeps = max(1, round(self._period / world.opt.timestep))
         self._contacts = GroundContacts(world, index)
         self._measurement = _Measurement(own_model, self._disturbance, self._period)
+        self._torques: deque[Array] = deque(maxlen=LATENCY + 1)
         self._jacobian = np.zeros((3, world.nv))
         self._samples: list[_Sample] = []
         self._fall: Incident | None = None
@@ -129,8 +131,8 @@ class Simulation:
         """One control step and its physics steps. Negative steps settle on the first sample of the reference and are not recorded."""
         k, time = max(step, 0), step * self._period
         self._push(time)
-        touching, measured = self._measure()
-        torque = self._control(k, measured)
+        touching = self._measure()
+        torque = self._control(step)
         sample = self._observe(k, torque)
         stray = self._step(sample)
         if self._blew_up():
@@ -147,18 +149,23 @@ class Simulation:
         force, push = self._data.xfrc_applied[self._index.base, :3], self._disturbance.push
         force[:] = push[2:] if push and push[0] <= time < push[0] + push[1] else 0.0
 
-    def _measure(self) -> tuple[Bools, Bools]:
-        """Which feet touch the ground (E,), and which ones the controller sees there. The measured state is in `_measurement.data`."""
+    def _measure(self) -> Bools:
+        """Which feet touch the ground (E,). What the controller sees is in `_measurement`."""
         mujoco.mj_step1(self._world, self._data)
         touching = self._contacts.detect(self._data)
-        return touching, self._measurement.take(self._data.qpos, self._data.qvel, touching)
+        self._measurement.take(self._data.qpos, self._data.qvel, touching)
+        return touching
 
-    def _control(self, k: int, measured: Bools) -> Array:
-        """Set the motors and the feet's adhesion; returns the torques (E, 3) N m that the controller asks for."""
-        torque = self._controller.torque(k, self._measurement.data, measured)
+    def _control(self, step: int) -> Array:
+        """Set the motors and the feet's adhesion; returns the torques (E, 3) N m that act. The next ones are computed meanwhile."""
+        seen = self._measurement
+        k = min(max(step + LATENCY, 0), len(self._reference.t) - 1)
+        self._torques.append(self._controller.torque(k, seen.qpos, seen.qvel, seen.touching))
+        torque = self._torques[0]
         self._data.ctrl[self._index.actuator.ravel()] = torque.ravel()
         for e, actuator in self._contacts.adhesion:
-            self._data.ctrl[actuator] = float(self._reference.contact[k, e])
+            strength = float(self._world.actuator_gainprm[actuator, 0])
+            self._data.ctrl[actuator] = self._adhesion[max(step, 0), e] / strength
         return torque
 
     def _observe(self, k: int, torque: Array) -> _Sample:

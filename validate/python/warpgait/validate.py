@@ -58,7 +58,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's folder)")
     parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's robot")
     parser.add_argument("--rate", type=float, default=settings.rate, metavar="HZ", help="control rate (default %(default)g)")
-    parser.add_argument("--quick", action="store_true", help="skip the second replay, with finer time steps")
+    parser.add_argument("--quick", action="store_true", help="skip the replays with finer time steps and in other worlds")
+    parser.add_argument("--no-robust", action="store_true", help="skip the replays in worlds that differ from the plan's")
     parser.add_argument("--no-raw", action="store_true", help="skip the replay on the raw heightfield")
     parser.add_argument("--no-pictures", action="store_true", help="no pictures in the report")
     parser.add_argument("--video", action="store_true", help="write NAME.mp4 as well")
@@ -76,6 +77,33 @@ def _parser() -> argparse.ArgumentParser:
         help="multiplies the mass of the base body (default %(default)g)",
     )
     world.add_argument(
+        "--body-factor",
+        type=float,
+        default=disturbance.body_factor,
+        metavar="FACTOR",
+        help="multiplies every mass and inertia of the robot (default %(default)g)",
+    )
+    world.add_argument(
+        "--com-shift",
+        action=_numbers(3, "DX,DY,DZ in m"),
+        default=disturbance.com_shift,
+        metavar="DX,DY,DZ",
+        help="move the robot's center of mass, m, frame of the base",
+    )
+    world.add_argument(
+        "--payload",
+        action=_numbers(4, "KG,X,Y,Z in kg and m"),
+        metavar="KG,X,Y,Z",
+        help="a load on the base, and where: m from its origin, frame of the base",
+    )
+    world.add_argument(
+        "--drives",
+        type=float,
+        default=disturbance.drives,
+        metavar="LEVEL",
+        help="rotor inertia and friction of the drives; at level 1, 1e-4 kg m² for each N m of the torque limit, and 0.5 %% of it (default %(default)g)",
+    )
+    world.add_argument(
         "--push",
         action=_numbers(5, "START,DURATION,FX,FY,FZ in s and N"),
         metavar="T,DT,FX,FY,FZ",
@@ -89,6 +117,13 @@ def _parser() -> argparse.ArgumentParser:
         help="move the ground, m",
     )
     world.add_argument(
+        "--terrain-tilt",
+        action=_numbers(2, "ABOUT_X,ABOUT_Y in degrees"),
+        default=disturbance.terrain_tilt,
+        metavar="AX,AY",
+        help="tilt the ground about the middle of the first footholds, degrees",
+    )
+    world.add_argument(
         "--noise",
         type=float,
         default=disturbance.noise,
@@ -100,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         default=disturbance.delay,
         metavar="S",
-        help="time between measurement and control (default %(default)g)",
+        help="time between measurement and control, beside one control step (default %(default)g)",
     )
     world.add_argument("--seed", type=int, default=disturbance.seed, help="seed of the noise (default %(default)s)")
     return parser
@@ -111,13 +146,25 @@ def _settings(options: argparse.Namespace) -> Settings:
     disturbance = Disturbance(
         friction=options.friction,
         mass_factor=options.mass_factor,
+        body_factor=options.body_factor,
+        com_shift=options.com_shift,
+        payload=options.payload,
+        drives=options.drives,
         terrain_shift=options.terrain_shift,
+        terrain_tilt=options.terrain_tilt,
         push=options.push,
         noise=options.noise,
         delay=options.delay,
         seed=options.seed,
     )
-    return Settings(options.model, options.rate, quick=options.quick, raw=not options.no_raw, disturbance=disturbance)
+    return Settings(
+        options.model,
+        options.rate,
+        quick=options.quick,
+        robust=not options.no_robust,
+        raw=not options.no_raw,
+        disturbance=disturbance,
+    )
 
 
 def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:

@@ -1,4 +1,4 @@
-"""A plan in, evidence out: laws, open loop and closed loop, with two time steps, on planned and raw terrain."""
+"""A plan in, evidence out: laws, open loop and closed loop, with two time steps, on planned and raw terrain, and in other worlds."""
 
 from __future__ import annotations
 
@@ -10,23 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from . import laws
-from .arrays import Array
-from .collision import SelfCollision
-from .controllers import WholeBody
+from . import laws, robust
+from .closedloop import ClosedLoop, Robot, robot_of, world_of
 from .criteria import Metric, Verdict
 from .errors import InputError
-from .metrics import OPEN_LOOP, judge_closed_loop, judge_collisions, judge_open_loop
-from .model import Indices, check_mujoco, find_model, indices, load_robot, load_spec, model_file
+from .metrics import OPEN_LOOP, judge_open_loop
+from .model import Indices, check_mujoco
 from .openloop import OpenLoop, analyze
 from .plan import Heightfield, Plan
 from .reference import Reference, sample
 from .replay import Incident, Replay
-from .scene import build_world
+from .robust import Attempt, attempt_all
 from .settings import PHYSICS_RATES, Settings
-from .simulation import Simulation
 
-ADHESION_FACTOR = 1.1  # strength of the simulated adhesion, as a multiple of the largest pull that the plan may use
 NOTED_MASS_ERROR = 0.01  # fraction by which the masses of plan and model may differ without a note
 
 
@@ -59,13 +55,19 @@ class Validation:
     analysis: OpenLoop
     metrics: list[Metric]  # of the open loop
     trials: list[Trial]
+    attempts: list[Attempt]  # in worlds that differ from the plan's; none where they were left out
     notes: list[str]
     seconds: float
 
     @property
     def all_metrics(self) -> list[Metric]:
-        """The metrics that decide the verdict: laws, open loop, and all trials."""
-        return [*self.laws.metrics, *self.metrics, *(m for t in self.trials for m in t.metrics)]
+        """The metrics that decide the verdict: laws, open loop, all trials, and the worlds that are tracked."""
+        return [*self.laws.metrics, *self.metrics, *(m for t in self.trials for m in t.metrics), *self.robust_metrics]
+
+    @property
+    def robust_metrics(self) -> list[Metric]:
+        """How many of the worlds that differ from the plan's are tracked; empty where they were left out."""
+        return [robust.judge(self.attempts)] if self.attempts else []
 
     @property
     def verdict(self) -> Verdict:
@@ -91,34 +93,7 @@ class Validation:
         return Incident(metric.time, metric.reason, metric.foot)
 
 
-@dataclass(frozen=True)
-class _Robot:
-    """The full robot as the controllers see it, and how its feet stick."""
-
-    path: Path
-    model: Any  # without contacts
-    index: Indices
-    pull: Array  # (E,) N, how hard each foot may pull
-    adhesive: tuple[str, ...]
-    adhesion: float  # N, strength of the adhesion actuators
-
-    @property
-    def preload(self) -> Array:
-        """Adhesion (E,) N that adds to the normal force in the friction law."""
-        return self.pull * ADHESION_FACTOR
-
-
-def _robot(plan: Plan, model: str | None) -> _Robot:
-    """Load `model`, or the full model of the plan's robot."""
-    path = model_file(model) if model else find_model(plan.robot.name)
-    own = load_robot(path, plan.robot.gravity)
-    limit = plan.pull_limit * plan.weight
-    adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
-    pull = np.where(plan.foot_adhesive, limit, 0.0)
-    return _Robot(path, own, indices(own, plan.foot_names), pull, adhesive, limit * ADHESION_FACTOR)
-
-
-def _notes(plan: Plan, robot: _Robot) -> list[str]:
+def _notes(plan: Plan, robot: Robot) -> list[str]:
     """What a reader of the report should know first."""
     notes = []
     if not plan.solved:
@@ -135,47 +110,38 @@ def _notes(plan: Plan, robot: _Robot) -> list[str]:
     return notes
 
 
-class _Trials:
-    """The simulations of one plan."""
-
-    def __init__(self, plan: Plan, robot: _Robot, world: Any, analysis: OpenLoop, settings: Settings) -> None:
-        """`world` has the planned terrain."""
-        self.plan, self.robot, self.world, self.analysis, self.settings = plan, robot, world, analysis, settings
-        self.collision = SelfCollision(load_spec(robot.path), robot.index)
-        self.reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
-
-    def run(self, say: Callable[[str], None]) -> list[Trial]:
-        """The closed loop on the planned terrain with both time steps, and on the raw terrain if asked for."""
-        plan, settings = self.plan, self.settings
-        trials = []
-        for rate in PHYSICS_RATES[:1] if settings.quick else PHYSICS_RATES:
-            name = "closed loop" if rate == PHYSICS_RATES[0] else f"closed loop, steps of {1e3 / rate:g} ms"
-            say(name)
-            self.world.opt.timestep = 1 / rate
-            trials.append(self._trial(name, plan.terrain, self.world))
-        if settings.raw and plan.terrain_raw is not None:
-            name = "closed loop, raw terrain"
-            say(name)
-            raw = _world_of(plan, self.robot, plan.terrain_raw, settings)
-            trials.append(self._trial(name, plan.terrain_raw, raw))
-        return trials
-
-    def _trial(self, name: str, terrain: Heightfield, world: Any) -> Trial:
-        robot, reference = self.robot, self.reference
-        controller = WholeBody(robot.model, robot.index, reference, self.plan.robot.friction, robot.pull, robot.preload)
-        index, start = indices(world, self.plan.foot_names), self.analysis.qpos[0]
-        disturbance = self.settings.disturbance
-        replay = Simulation(world, robot.model, index, reference, controller, start, disturbance).run()
-        metrics, incidents = judge_closed_loop(name, self.plan, replay, reference, index)
-        if len(replay.t) > 1:
-            metrics.append(judge_collisions(name, self.collision.find(replay.t, replay.qpos)))
-        return Trial(name, terrain, reference, replay, metrics, incidents)
+def _left_out(settings: Settings) -> list[str]:
+    """What was not done, for a reader of the report."""
+    if settings.quick:
+        return ["Quick: the replay with steps of 1 ms and those in worlds that differ from the plan's were left out."]
+    if not settings.robust:
+        return ["The replays in worlds that differ from the plan's were left out."]
+    if not settings.in_other_worlds:
+        return ["This world was asked for; the replays in others that differ from the plan's were left out."]
+    return []
 
 
-def _world_of(plan: Plan, robot: _Robot, terrain: Heightfield, settings: Settings) -> Any:
-    """The MuJoCo model of the robot on `terrain`."""
-    friction, gravity = plan.robot.friction, plan.robot.gravity
-    return build_world(robot.path, terrain, friction, gravity, robot.adhesive, robot.adhesion, settings.disturbance)
+def _trials(plan: Plan, loop: ClosedLoop, world: Any, settings: Settings, say: Callable[[str], None]) -> list[Trial]:
+    """The closed loop on the planned terrain, in `world`, with both time steps, and on the raw terrain if asked for."""
+    trials = []
+
+    def add(name: str, terrain: Heightfield, world: Any, rate: float) -> None:
+        say(name)
+        found = loop.run(name, world, settings.disturbance, rate)
+        trials.append(Trial(name, terrain, loop.reference, found.replay, found.metrics, found.incidents))
+
+    for rate in PHYSICS_RATES[:1] if settings.quick else PHYSICS_RATES:
+        name = "closed loop" if rate == PHYSICS_RATES[0] else f"closed loop, steps of {1e3 / rate:g} ms"
+        add(name, plan.terrain, world, rate)
+    if settings.raw and plan.terrain_raw is not None:
+        raw = world_of(plan, loop.robot, plan.terrain_raw, settings.disturbance)
+        add("closed loop, raw terrain", plan.terrain_raw, raw, PHYSICS_RATES[0])
+    return trials
+
+
+def _attempts(loop: ClosedLoop, settings: Settings, say: Callable[[str], None]) -> list[Attempt]:
+    """The closed loop in worlds that differ from the plan's, if asked for."""
+    return attempt_all(loop, settings.model, say) if settings.in_other_worlds else []
 
 
 def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], None] = lambda _: None) -> Validation:
@@ -194,15 +160,16 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
     quiet: Any = "ignore" if found.broken else None
     try:
         with np.errstate(all=quiet):
-            robot = _robot(plan, settings.model)
+            robot = robot_of(plan, settings.model)
             say("open loop")
-            world = _world_of(plan, robot, plan.terrain, settings)
-            index = indices(world, plan.foot_names)
-            analysis = analyze(plan, robot.model, world, index)
+            world = world_of(plan, robot, plan.terrain, settings.disturbance)
+            analysis = analyze(plan, robot.model, world, robot.index)
             metrics = judge_open_loop(plan, analysis, robot.index)
-            simulations = _Trials(plan, robot, world, analysis, settings)
-            metrics.append(judge_collisions(OPEN_LOOP, simulations.collision.find(plan.t, analysis.qpos)))
-            trials = simulations.run(say)
+            reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
+            loop = ClosedLoop(plan, robot, reference, analysis.qpos[0])
+            metrics.append(loop.collisions(OPEN_LOOP, plan.t, analysis.qpos))
+            trials = _trials(plan, loop, world, settings, say)
+            attempts = _attempts(loop, settings, say)
     except InputError:
         raise
     except Exception as error:
@@ -212,7 +179,6 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
         broken = ", ".join(found.broken)
         raise InputError(f"{plan.path}: cannot be replayed, and fails checks: {broken}; see `warpgait check`") from error
     notes = _notes(plan, robot) + [f"{remark}." for remark in found.remarks]
-    if settings.quick:
-        notes.append("Quick: the replay with steps of 1 ms was left out.")
+    notes += _left_out(settings)
     seconds = time.perf_counter() - started
-    return Validation(plan, robot.path, index, settings, found, analysis, metrics, trials, notes, seconds)
+    return Validation(plan, robot.path, robot.index, settings, found, analysis, metrics, trials, attempts, notes, seconds)
