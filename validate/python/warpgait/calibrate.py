@@ -1,4 +1,4 @@
-"""`python -m warpgait.calibrate PLAN…`: the values of every metric for good plans, and for the same plans spoiled in six ways.
+"""`python -m warpgait.calibrate PLAN…`: the values of every metric for good plans, and for the same plans spoiled in several ways.
 
 The limits in `criteria.py` must lie between the two. Prints two Markdown tables: the values of every metric, and how each spoiling was
 judged. `--csv` writes every value to a file.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
+import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,10 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
+from .arrays import runs
 from .console import ERROR, complain, emit, run
 from .criteria import Criterion, Metric, Verdict
 from .errors import InputError
 from .files import ensure_outputs, replacing
+from .laws import CHECK
 from .plan import Plan, read_plan
 from .settings import Disturbance, Settings
 from .validation import validate
@@ -52,6 +55,33 @@ def _swapped(plan: Plan) -> Plan:
     return swap_contacts(plan, int(first), int(second))
 
 
+def _late(seconds: float) -> Callable[[Plan], Plan]:
+    """The forces come later than the motion that they belong to."""
+
+    def change(plan: Plan) -> Plan:
+        shift = round(seconds / plan.t[1])
+        at = np.maximum(np.arange(len(plan.t)) - shift, 0)
+        return replace(plan, foot_force=plan.foot_force[at])
+
+    return change
+
+
+def swap_one_step(plan: Plan) -> Plan:
+    """In the step in the middle of the plan, another foot is said to swing: one that stands then."""
+    contact = plan.foot_contact.copy()
+    swings = [(abs(first + end - len(contact)), e, first, end) for e, c in enumerate(contact.T) for first, end in runs(~c)]
+    if not swings:
+        return plan
+    _, e, first, end = min(swings)
+    other = int(contact[first:end].sum(0).argmax())
+    contact[first:end, e], contact[first:end, other] = True, False
+    return replace(plan, foot_contact=contact)
+
+
+def _without_accelerations(plan: Plan) -> Plan:
+    return replace(plan, foot_acceleration=0 * plan.foot_acceleration)
+
+
 @dataclass(frozen=True)
 class Spoiling:
     """A change for the worse, of the plan or of the world."""
@@ -69,13 +99,34 @@ SPOILINGS = (
     Spoiling("mass × 1.3", world=Disturbance(mass_factor=1.3)),
     Spoiling("friction 0.25", world=Disturbance(friction=0.25)),
     Spoiling("ground 10 cm off", world=Disturbance(terrain_shift=(0.1, 0.0, 0.0))),
+    Spoiling("friction 0.6", world=Disturbance(friction=0.6)),
+    Spoiling("forces 20 ms late", _late(0.02)),
+    Spoiling("forces 60 ms late", _late(0.06)),
+    Spoiling("mass × 0.88", world=Disturbance(body_factor=0.88)),
+    Spoiling("contacts of one step swapped", swap_one_step),
+    Spoiling("ground tilted by 3°", world=Disturbance(terrain_tilt=(3.0, 0.0))),
+    Spoiling("foot accelerations zeroed", _without_accelerations),
 )
 
 
-def measure(plan: Plan, spoiling: Spoiling) -> list[Metric]:
-    """The metrics of a spoiled plan, but for the laws of `warpgait check`, which judge files."""
-    settings = Settings(check=False, quick=True, raw=False, disturbance=spoiling.world)
-    return validate(spoiling.change(plan), settings).all_metrics
+def measure(plan: Plan, spoiling: Spoiling, check: bool = False) -> list[Metric]:
+    """The metrics of a spoiled plan, with the laws of `warpgait check` if asked for; those judge files."""
+    settings = Settings(check=check, quick=True, raw=False, disturbance=spoiling.world)
+    spoiled = spoiling.change(plan)
+    if not check or spoiled is plan:
+        return validate(spoiled, settings).all_metrics
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / plan.path.name
+        _write(spoiled, file)
+        return validate(read_plan(file), settings).all_metrics
+
+
+def _write(plan: Plan, target: Path) -> None:
+    """The file of `plan` with the arrays that it has now."""
+    with np.load(plan.path) as archive:
+        members = dict(archive)
+    members |= {key: value for key in members if isinstance(value := getattr(plan, key, None), np.ndarray)}
+    np.savez(target, **members)
 
 
 Key = tuple[str, str]  # layer, metric
@@ -123,10 +174,12 @@ class Measurements:
 
     def add(self, plan: Plan, spoiling: Spoiling) -> Verdict:
         """Measure one plan under one spoiling."""
-        metrics = measure(plan, spoiling)
+        metrics = measure(plan, spoiling, check=True)
         verdict = max(m.verdict for m in metrics)
         self.judged[spoiling.name].append((verdict.word, [m.name for m in metrics if m.verdict is not Verdict.PASS]))
         for metric in metrics:
+            if metric.layer == CHECK:
+                continue
             key = metric.layer, metric.name
             self.criteria.setdefault(key, metric.criterion)
             self.values[key][spoiling.name].append(metric.value)

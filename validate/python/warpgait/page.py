@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,17 @@ def _trial(trial: Trial) -> list[str]:
     return parts
 
 
+def _figures(v: Validation) -> list[str]:
+    """Figures by which walks are compared."""
+    rows = [
+        f'<tr><td>{escape(f.name)}</td><td class="n">{f.value:.3g}</td><td class="unit">{escape(f.unit)}</td></tr>'
+        for f in v.figures
+        if math.isfinite(f.value)
+    ]
+    table = f'<div class="scroll"><table>{"".join(rows)}</table></div>'
+    return [f"<h2>Figures of the replay</h2>{table}"] if rows else []
+
+
 def _worlds(v: Validation) -> list[str]:
     """The worlds that differ from the plan's: which are tracked, and the metric that comes closest to its wider limit."""
     if not v.attempts:
@@ -165,6 +177,7 @@ def as_html(v: Validation, pictures: list[tuple[float, bytes]], picture_note: st
     for trial in v.trials:
         parts += _trial(trial)
     parts += _worlds(v)
+    parts += _figures(v)
     parts.append(f"<h2>{_title(v.shown.name)}, over time in s</h2>")
     parts += _plots(v, v.shown)
     return "\n".join(parts) + "</html>\n"

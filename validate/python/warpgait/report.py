@@ -91,6 +91,7 @@ def as_dict(v: Validation) -> dict[str, Any]:
         "open_loop": {"metrics": [_metric(m) for m in v.metrics]},
         "replays": [_trial(t) for t in v.trials],
         "robust": _robust(v),
+        "figures": {f.key: f.value if math.isfinite(f.value) else None for f in v.figures},
         "seconds": round(v.seconds, 3),
     }
 

@@ -14,6 +14,7 @@ from . import laws, robust
 from .closedloop import ClosedLoop, Robot, robot_of, world_of
 from .criteria import Metric, Verdict
 from .errors import InputError
+from .figures import Figure, figures
 from .metrics import OPEN_LOOP, judge_open_loop
 from .model import Indices, check_mujoco
 from .openloop import OpenLoop, analyze
@@ -78,6 +79,12 @@ class Validation:
     def trackable(self) -> bool:
         """Whether the robot walks the plan: passed, or marginal."""
         return self.verdict is not Verdict.FAIL
+
+    @property
+    def figures(self) -> list[Figure]:
+        """Figures of the first trial, by which walks are compared. They do not decide the verdict."""
+        first = self.trials[0]
+        return figures(self.plan, first.replay, first.reference, self.index)
 
     @property
     def shown(self) -> Trial:
