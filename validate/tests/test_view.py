@@ -124,6 +124,41 @@ def test_moments_at_which_laws_fail_come_first(walk_plan: Path, tmp_path: Path) 
     assert np.argmax(curve) in (36, 37, 38) and curve.max() > 3 > np.median(curve)
 
 
+def test_metrics_of_the_replay_have_their_moments(page: str, warped_plan: Path) -> None:
+    title, rows, _ = data_of(page)["tables"][1]
+    report = json.loads(warped_plan.with_name("walk.report.json").read_text())
+    metrics = [*report["open_loop"]["metrics"], *(m for trial in report["replays"] for m in trial["metrics"])]
+    assert title.startswith("Metrics of the replay") and len(rows) == len(metrics)
+    slip = next(row for row in rows if row["name"] == "closed loop: slip in the worst stance")
+    found = next(m for m in report["replays"][0]["metrics"] if m["name"] == "slip in the worst stance")
+    assert slip["time"] == found["time"] and slip["foot"] == found["foot"] and slip["good"] == (found["verdict"] == "pass")
+
+
+def test_unknown_ground_and_patches_are_shown(walk_plan: Path, tmp_path: Path) -> None:
+    corners = np.full((4, 2, 4, 3), np.nan)
+    corners[:, 0] = np.array([[0.1, 0.1, 0.0], [0.2, 0.1, 0.0], [0.2, 0.2, 0.0], [0.1, 0.2, 0.0]]) + np.arange(4)[:, None, None]
+
+    def change(a: dict[str, Any]) -> None:
+        unknown = np.zeros(a["heightfield"].shape, bool)
+        unknown[60:70, 80:95] = True
+        a.update(heightfield_unknown=unknown, patch_corners=corners, heightfield_raw=a["heightfield"] + 0.01)
+
+    plan = crawl.altered(walk_plan, tmp_path / "edges.plan.npz", change)
+    assert main([str(plan), "--html", str(tmp_path / "a.html"), "-q"]) == 0
+    data = data_of((tmp_path / "a.html").read_text())
+    ground = data["ground"]
+    unknown = unpacked(ground["unknown"]).reshape(ground["rows"], ground["columns"])
+    i, j = np.argwhere(unknown).mean(0)
+    x, y = (ground["origin"][axis] + at * ground["spacing"][axis] for axis, at in ((0, j), (1, i)))
+    assert (x, y) == (pytest.approx(-1.5 + 0.02 * 87, abs=0.02), pytest.approx(-1.5 + 0.02 * 64.5, abs=0.02))
+    assert [patch["foot"] for patch in data["patches"]] == [0, 1, 2, 3]
+    np.testing.assert_allclose(data["patches"][3]["corners"], corners[3, 0])
+    # Planned for the raw ground, the other surface is the smoothed one.
+    assert ground["raw_label"] == "smoothed ground"
+    between = (ground["high"] - ground["low"]) / 65535 * (unpacked(ground["heights"]).astype(float) - unpacked(ground["raw"]))
+    np.testing.assert_allclose(between, 0.01, atol=1e-4)
+
+
 def test_a_robot_without_joints_is_a_box_with_lines(tmp_path: Path) -> None:
     plan = tmp_path / "towr.plan.npz"
     warpgait.solve(WALK, overrides={"robot.name": "anymal_towr"}).save(plan)

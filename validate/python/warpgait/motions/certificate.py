@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -27,6 +28,22 @@ class Report:
     first_failure: str | None = None
     robot: str | None = None  # the model that it was replayed on
     note: str = "there is no report; warpgait validate makes one"
+    metrics: tuple[dict[str, Any], ...] = ()  # of the open loop and the replays, as in the report, with `layer`
+
+
+def _metric(layer: str, found: dict[str, Any]) -> dict[str, Any]:
+    """A metric of a report, its types as they should be."""
+    time, value = found["time"], found["value"]
+    return {
+        "layer": layer,
+        "name": str(found["name"]),
+        "value": math.nan if value is None else float(value),
+        "unit": str(found["unit"]),
+        "limit": f"{'≥' if found['limit'] == 'at least' else '≤'} {float(found['pass']):g}",
+        "verdict": str(found["verdict"]),
+        "time": None if time is None else float(time),
+        "foot": None if found["foot"] is None else str(found["foot"]),
+    }
 
 
 def report_of(plan: Plan) -> Report:
@@ -43,9 +60,10 @@ def report_of(plan: Plan) -> Report:
         if found["verdict"] not in ("pass", "marginal", "fail"):
             return Report(note="the replay gave no verdict")
         failure = found["first_failure"]
-        return Report(
-            str(found["verdict"]), None if failure is None else str(failure["what"]), str(found["robot"]["replayed"]), ""
-        )
+        layers = [("open loop", found["open_loop"]), *((str(trial["name"]), trial) for trial in found["replays"])]
+        metrics = tuple(_metric(layer, m) for layer, part in layers for m in part["metrics"])
+        what = None if failure is None else str(failure["what"])
+        return Report(str(found["verdict"]), what, str(found["robot"]["replayed"]), "", metrics)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return Report(note="the report cannot be read")
 

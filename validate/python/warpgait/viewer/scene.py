@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..files import stem_of
 from ..laws import check, explained
 from ..motions import Motion, motion_of_plan, motion_of_replay
+from ..motions.certificate import report_of
 from ..openloop import centroidal_residual
 from ..plan import Heightfield, Plan, read_plan
 from .warping import Warping, grid, warping_of
@@ -239,6 +240,21 @@ def _laws(plan: Plan) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: bool(row["good"]))
 
 
+def _replay_metrics(plan: Plan) -> list[dict[str, Any]]:
+    """The metrics of the report beside the plan, those that do not pass first."""
+    rows = [
+        {
+            "name": f"{m['layer']}: {m['name']}",
+            "value": _number(m["value"], m["unit"], m["limit"]),
+            "time": m["time"] if m["time"] is None or 0 <= m["time"] <= plan.duration else None,
+            "foot": m["foot"],
+            "good": m["verdict"] == "pass",
+        }
+        for m in report_of(plan).metrics
+    ]
+    return sorted(rows, key=lambda row: bool(row["good"]))
+
+
 def _summary(motion: Motion, note: str) -> list[dict[str, str]]:
     certificate = motion.certificate
     laws = "Every law of the check holds." if certificate["all_laws_hold"] else "The plan breaks laws of the check."
@@ -314,7 +330,10 @@ def _scene_of(plan: Plan) -> dict[str, Any]:
     bodies, legs = (_shapes(motion), None) if motion.body_names else _box_robot(plan)
     warping = warping_of(archive, plan)
     drawn, warped = (None, None) if warping is None else _warped(archive, plan, warping, at)
-    laws = _laws(plan)
+    laws, metrics = _laws(plan), _replay_metrics(plan)
+    tables = [["Laws of the check, and when each is worst", laws, True]]
+    if metrics:
+        tables.append(["Metrics of the replay, and when each is worst", metrics, True])
     x = plan.base_position
     return {
         "name": motion.name,
@@ -336,8 +355,8 @@ def _scene_of(plan: Plan) -> dict[str, Any]:
         "map": drawn,
         "warped": warped,
         "curves": _curves(plan, at, motion, replayed),
-        "moments": [{"time": row["time"], "good": row["good"]} for row in laws if row["time"] is not None],
-        "tables": [["Laws of the check, and when each is worst", laws, True]],
+        "moments": [{"time": row["time"], "good": row["good"]} for row in [*laws, *metrics] if row["time"] is not None],
+        "tables": tables,
         "summary": _summary(motion, note),
         "facts": motion.facts,
     }
