@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import WALK
 
 import crawl
 from warpgait.errors import InputError
@@ -69,6 +70,29 @@ def test_modules_of_the_working_folder_are_not_imported(walk_plan: Path, tmp_pat
     # With pictures: their process is one of its own.
     done = _run([str(walk_plan), "-o", "out", "--quick"], cwd=tmp_path, stdout=subprocess.PIPE)
     assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "written"),
+    [
+        (["export", "walk.plan.npz", "--to", "csv"], "walk.csv"),
+        (["view", "walk.plan.npz", "--html", "walk.html"], "walk.html"),
+        (["sweep", "s.toml"], "s.sweep/results.csv"),
+    ],
+)
+def test_other_commands_import_nothing_from_the_working_folder(
+    walk_plan: Path, tmp_path: Path, words: list[str], written: str
+) -> None:
+    (tmp_path / "warpgait").mkdir()
+    for module in ("numpy.py", "mujoco.py", "json.py", "warpgait/__init__.py", "warpgait/sweeps.py"):
+        (tmp_path / module).write_text("open('ran', 'a').write(__file__ + '\\n')\n")
+    (tmp_path / "walk.plan.npz").write_bytes(walk_plan.read_bytes())
+    (tmp_path / "walk.toml").write_text(WALK)
+    (tmp_path / "s.toml").write_text('scenario = "walk.toml"\n[values]\nsolver.max_iterations = [1]\n')
+    command = [sys.executable, "-P", "-m", f"warpgait.{words[0]}", *words[1:]]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and (tmp_path / written).is_file(), done.stderr
     assert not (tmp_path / "ran").exists()
 
 
