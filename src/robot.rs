@@ -16,10 +16,20 @@ const SHIPPED: &[(&str, &str)] = &[
     ("anymal_towr", include_str!("../robots/anymal_towr.toml")),
     ("anymal_b", include_str!("../robots/anymal_b.toml")),
     ("anymal_c", include_str!("../robots/anymal_c.toml")),
+    ("a1", include_str!("../robots/a1.toml")),
+    ("b1", include_str!("../robots/b1.toml")),
+    ("go1", include_str!("../robots/go1.toml")),
+    ("go2", include_str!("../robots/go2.toml")),
+    ("hyq", include_str!("../robots/hyq.toml")),
+    ("laikago", include_str!("../robots/laikago.toml")),
+    ("solo12", include_str!("../robots/solo12.toml")),
 ];
 
-/// Least half of an edge of a reach box, m: more than the planner's margins take off it.
+/// Least half of an edge of a reach box, m, for a robot of ANYmal's size: more than the planner's margins take off it.
 pub const LEAST_REACH: f64 = 0.02;
+/// Standing height of the ANYmals, m; sizes of robots are multiples of the step.
+const ANYMAL_HEIGHT: f64 = 0.43;
+const SIZE_STEP: f64 = 0.05;
 /// Characters of the longest name, of a robot or a foot.
 const LONGEST_NAME: usize = 100;
 /// Radius of a foot, in standing heights, where it is not known.
@@ -146,6 +156,11 @@ impl Robot {
         -self.feet.iter().map(|foot| foot.nominal[2]).sum::<f64>() / self.feet.len() as f64
     }
 
+    /// The robot's size in ANYmals, by its standing height: 1 for all ANYmals. Clearances and margins are proportional to it.
+    pub fn size(&self) -> f64 {
+        (self.standing_height() / ANYMAL_HEIGHT / SIZE_STEP).round().max(1.0) * SIZE_STEP
+    }
+
     /// Radius of the largest foot, m; a typical one for the robot's height if its file describes no leg.
     pub fn foot_radius(&self) -> f64 {
         self.largest(|leg| leg.foot_radius).unwrap_or(TYPICAL_FOOT * self.standing_height())
@@ -190,6 +205,7 @@ impl Robot {
             let what = "allowed: none larger than the sum of the other two (no body has such an inertia)";
             return refuse(format!("principal moments {:.4?} kg m², {what}", moments.as_slice()));
         }
+        let least = LEAST_REACH * robot.size().min(1.0);
         for (i, foot) in robot.feet.iter().enumerate() {
             let key = format!("feet[{i}]");
             if foot.name.is_empty() || robot.feet[..i].iter().any(|other| other.name == foot.name) {
@@ -199,10 +215,10 @@ impl Robot {
             if !is_name(&foot.name) {
                 return Err(document.error(&format!("{key}.name"), no_name(&foot.name)));
             }
-            if let Some(axis) = (0..3).find(|&axis| foot.reach.half_size[axis] < LEAST_REACH) {
+            if let Some(axis) = (0..3).find(|&axis| foot.reach.half_size[axis] < least) {
                 let given = foot.reach.half_size[axis];
                 let what = format!(
-                    "given {given}, allowed: at least {LEAST_REACH} m; the planner keeps a margin inside the box"
+                    "given {given}, allowed: at least {least} m; the planner keeps a margin inside the box"
                 );
                 return Err(document.error(&format!("{key}.reach.half_size[{axis}]"), what));
             }
@@ -333,10 +349,12 @@ mod tests {
         let [old, new] =
             [&robot, &changed_in(anymal_c, "LF", "LF").unwrap()].map(|r| r.feet[0].leg().unwrap());
         for r in [[0.389, 0.240, -0.429], [0.25, 0.1, -0.4], [0.5, 0.3, -0.35]] {
-            let [old, new] = [old, new].map(|leg| leg.posture::<f64>(r));
-            for (a, b) in
-                old.angles().into_iter().chain(old.knee()).zip(new.angles().into_iter().chain(new.knee()))
-            {
+            let parts = |leg: &Leg| {
+                let posture = leg.posture::<f64>(r);
+                posture.swing_angles().chain(posture.on_shank([0.1, 0.05])).collect::<Vec<_>>()
+            };
+            let [old, new] = [parts(&old), parts(&new)];
+            for (a, b) in old.iter().zip(&new) {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
             }
         }

@@ -47,11 +47,33 @@ fn help_and_usage() {
         let (code, out, _) = warpgait(folder.path(), &["terrain", command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
-    for command in ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view", "sweep"]
+    for command in
+        ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view", "sweep", "robot"]
     {
         let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
+}
+
+#[test]
+fn robots_are_listed_and_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["robot", "list"]);
+    assert_eq!(code, 0);
+    for name in warpgait::robot::Robot::shipped() {
+        assert!(out.contains(name), "{name}: {out}");
+    }
+    let (code, out, _) = warpgait(folder.path(), &["robot", "show", "anymal_c"]);
+    assert!(code == 0 && out.contains("52.13 kg") && out.contains("RH_KFE"), "{out}");
+    let drawing = std::fs::read_to_string(folder.path().join("anymal_c.robot.svg")).unwrap();
+    assert!(drawing.matches("<polyline").count() >= 8 && drawing.contains(">RH<"), "{drawing}");
+    std::fs::write(folder.path().join("mine.toml"), include_str!("../robots/anymal_b.toml")).unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["robot", "show", "mine.toml", "--json"]);
+    assert_eq!(code, 0);
+    let robot: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(robot["feet"][3]["leg"]["joints"][2]["name"], "RH_KFE");
+    refused(folder.path(), &["robot", "show", "anymal_d"], &["robot.name", "did you mean"]);
+    refused(folder.path(), &["robot", "show", "none.toml"], &["none.toml"]);
 }
 
 #[test]

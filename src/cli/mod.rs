@@ -14,6 +14,7 @@ mod init;
 mod map;
 mod progress_line;
 mod python;
+mod robot;
 mod schema;
 mod solve;
 mod sweep;
@@ -72,6 +73,8 @@ enum Command {
     Map(map::MapArguments),
     /// Draw a ground and say what it was taken for, or convert it
     Terrain(terrain::TerrainArguments),
+    /// Make a robot of a URDF or MJCF, show one, or list those that ship
+    Robot(robot::RobotArguments),
     /// Recompute every law of a plan in ambient space, on the plan's own samples
     Check(check::CheckArguments),
     /// Reproduce the paper's tables and figures, and measure beyond them
@@ -130,6 +133,7 @@ impl Command {
             Command::Export(arguments) => arguments.python.has_json(),
             Command::View(arguments) => arguments.python.has_json(),
             Command::Sweep(arguments) => arguments.python.has_json(),
+            Command::Robot(arguments) => arguments.has_json(),
             _ => false,
         }
     }
@@ -144,6 +148,7 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Terrain(arguments) => terrain::terrain(&arguments, console),
         Command::Check(arguments) => check::check(&arguments, console),
         Command::Bench(arguments) => bench::bench(arguments, console),
+        Command::Robot(arguments) => robot::robot(&arguments, console),
         Command::BenchCase(arguments) => bench::case(&arguments),
         Command::Validate(arguments) => arguments.python.run("warpgait.validate", console),
         Command::Export(arguments) => arguments.python.run("warpgait.export", console),

@@ -58,8 +58,8 @@ impl Constraint for BaseClearance {
         self.places.len()
     }
 
-    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(self.clearance + margins::BASE_CLEARANCE);
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        lower.fill(self.clearance + model.size * margins::BASE_CLEARANCE);
         upper.fill(f64::INFINITY);
     }
 

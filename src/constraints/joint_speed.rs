@@ -1,20 +1,22 @@
-//! Speed limits of hip and knee of a swinging leg.
+//! Speed limits of the joints of a swinging leg.
 //!
 //! ```text
-//!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  q = (φ, κ),  r = Rᵀ(p_i − p)
+//!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  r = Rᵀ(p_i − p)
 //! ```
 //!
-//! φ and κ are the angles of thigh and knee, see [`crate::leg`]. The abduction is slow and has no row. Legs that the robot's
-//! file does not describe have none either.
+//! q are the angles of thigh and knee for a leg with a closed form, of which the abduction is slow and has no row, and otherwise those of
+//! all joints, see [`crate::leg`]. Legs that the robot's file does not describe have no rows.
 //!
 //! Differences are over half intervals. Over whole ones, a foot that flicks over an edge within two of them would appear at
 //! half its true speed.
 //!
-//! Rows: thigh, knee for each half of an interval of which at least one end lies in a swing; fraction of the limit.
+//! Rows: each of these joints for each half of an interval of which at least one end lies in a swing; fraction of the limit.
+
+use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
 use crate::leg::Leg;
-use crate::leg::jet::{Jet, Scalar};
+use crate::leg::jet::Jet;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::sink::Sink;
@@ -26,43 +28,64 @@ use crate::trajectory::layout::Phase;
 /// Speeds of swinging legs.
 #[derive(Clone, Debug)]
 pub struct JointSpeed {
-    /// Foot, the ends of the half interval, and the leg.
-    places: Vec<(usize, [Instant; 2], Leg)>,
+    places: Vec<Half>,
+    /// First row of each place, and the number of rows.
+    offsets: Vec<usize>,
+}
+
+/// Half of an interval.
+#[derive(Clone, Debug)]
+struct Half {
+    foot: usize,
+    ends: [Instant; 2],
+    leg: Leg,
 }
 
 impl JointSpeed {
     /// For every swing of a leg whose geometry is known.
     pub fn new(model: &Model) -> Self {
         let mut places = Vec::new();
-        for (i, leg) in model.legs.iter().enumerate() {
-            let swings = |&at: &Instant| matches!(model.layout.phase_at(i, at), Phase::Swing(_));
+        for (foot, leg) in model.legs.iter().enumerate() {
+            let swings = |&at: &Instant| matches!(model.layout.phase_at(foot, at), Phase::Swing(_));
             if let Some(leg) = leg {
                 let halves = (0..model.layout.intervals).flat_map(|k| {
                     let middle = Instant::Between(k);
                     [[Instant::Sample(k), middle], [middle, Instant::Sample(k + 1)]]
                 });
-                places.extend(halves.filter(|ends| ends.iter().any(swings)).map(|ends| (i, ends, *leg)));
+                let halves = halves.filter(|ends| ends.iter().any(swings));
+                places.extend(halves.map(|ends| Half { foot, ends, leg: *leg }));
             }
         }
-        Self { places }
+        let mut offsets = vec![0];
+        for place in &places {
+            offsets.push(offsets[offsets.len() - 1] + place.leg.swing_joints().len());
+        }
+        Self { places, offsets }
+    }
+
+    /// The places with their first rows.
+    fn numbered(&self) -> impl Iterator<Item = (&Half, usize)> {
+        self.places.iter().zip(self.offsets.iter().copied())
     }
 }
 
-/// Number of the joint whose angle φ is; κ is that of the next.
-const FIRST: usize = 1;
+impl Half {
+    /// The foot's number and the instant of the start (0) or end (1).
+    fn place(&self, after: usize) -> (usize, Instant) {
+        (self.foot, self.ends[after])
+    }
 
-/// φ and κ at a sample.
-fn angles<T: Scalar>(leg: &Leg, r: [T; 3]) -> [T; 2] {
-    leg.posture(r).angles()
-}
+    /// The angles of the fast joints at its start (0) or end (1).
+    fn jets(&self, model: &Model, state: &State, after: usize) -> impl Iterator<Item = Jet> {
+        let r = foot_in_base::value(model, state, self.place(after));
+        self.leg.posture(Jet::variables(&r)).swing_angles()
+    }
 
-fn jets(model: &Model, state: &State, (i, ends, leg): &(usize, [Instant; 2], Leg), after: usize) -> [Jet; 2] {
-    angles(leg, Jet::variables(&foot_in_base::value(model, state, (*i, ends[after]))))
-}
-
-/// Derivative of a row with respect to the angle at its start (0) or end (1).
-fn scale(model: &Model, leg: &Leg, j: usize, after: usize) -> f64 {
-    (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step * leg.speed_limit[FIRST + j])
+    /// Derivatives of the rows with respect to the angles at its start (0) or end (1).
+    fn scales(&self, model: &Model, after: usize) -> impl Iterator<Item = f64> {
+        let rate = (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step);
+        self.leg.swing_joints().map(move |j| rate / self.leg.speed_limit[j])
+    }
 }
 
 impl Constraint for JointSpeed {
@@ -71,7 +94,7 @@ impl Constraint for JointSpeed {
     }
 
     fn rows(&self) -> usize {
-        2 * self.places.len()
+        self.offsets[self.places.len()]
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
@@ -80,22 +103,30 @@ impl Constraint for JointSpeed {
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, &(i, ends, leg)) in out.chunks_exact_mut(2).zip(&self.places) {
-            let [before, after] =
-                ends.map(|at| angles(&leg, foot_in_base::value(model, state, (i, at)).into()));
-            for (j, row) in rows.iter_mut().enumerate() {
-                *row = (after[j] - before[j]) * scale(model, &leg, j, 1);
+        for (place, first) in self.numbered() {
+            let [before, after] = [0, 1].map(|after| {
+                let r = foot_in_base::value(model, state, place.place(after));
+                place.leg.posture::<f64>(r.into()).swing_angles()
+            });
+            let rows = out[first..].iter_mut().zip(before.zip(after)).zip(place.scales(model, 1));
+            for ((row, (before, after)), scale) in rows {
+                *row = (after - before) * scale;
             }
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (n, place) in self.places.iter().enumerate() {
+        for (place, offset) in self.numbered() {
             for after in 0..2 {
-                let at = (place.0, place.1[after]);
-                for (j, jet) in jets(model, state, place, after).iter().enumerate() {
-                    let by_r = jet.first * scale(model, &place.2, j, after);
-                    foot_in_base::add_derivative(model, state, at, &by_r, &mut sink.row(first + 2 * n + j));
+                let rows = place.jets(model, state, after).zip(place.scales(model, after));
+                for (j, (jet, scale)) in rows.enumerate() {
+                    foot_in_base::add_derivative(
+                        model,
+                        state,
+                        place.place(after),
+                        &(jet.first * scale),
+                        &mut sink.row(first + offset + j),
+                    );
                 }
             }
         }
@@ -109,20 +140,23 @@ impl Constraint for JointSpeed {
         curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
-        for (lambda, place) in multipliers.chunks_exact(2).zip(&self.places) {
+        for (place, first) in self.numbered() {
             for after in 0..2 {
-                let at = (place.0, place.1[after]);
-                let [thigh, knee] = jets(model, state, place, after);
-                let weight = |j: usize| lambda[j] * scale(model, &place.2, j, after);
-                let sum = thigh * weight(0) + knee * weight(1);
-                foot_in_base::add_quadratic(model, state, at, &sum.second, curvature);
-                foot_in_base::add_curvature(model, state, at, &sum.first, curvature);
+                let (mut by_r, mut by_rr) = (Vector3::zeros(), Matrix3::zeros());
+                let rows = place.jets(model, state, after).zip(place.scales(model, after));
+                for ((jet, scale), lambda) in rows.zip(&multipliers[first..]) {
+                    by_r += jet.first * (scale * lambda);
+                    by_rr += jet.second * (scale * lambda);
+                }
+                foot_in_base::add_quadratic(model, state, place.place(after), &by_rr, curvature);
+                foot_in_base::add_curvature(model, state, place.place(after), &by_r, curvature);
             }
         }
     }
 
     fn place(&self, row: usize) -> RowPlace {
-        let (i, [start, end], _) = self.places[row / 2];
-        RowPlace { foot: Some(i), sample: 0.5 * (start.time() + end.time()) }
+        let place = &self.places[self.offsets.partition_point(|&first| first <= row) - 1];
+        let [start, end] = place.ends;
+        RowPlace { foot: Some(place.foot), sample: 0.5 * (start.time() + end.time()) }
     }
 }

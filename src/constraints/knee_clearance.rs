@@ -188,11 +188,11 @@ impl Constraint for KneeClearance {
         self.offsets[self.places.len()]
     }
 
-    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(margins::KNEE_CLEARANCE);
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        lower.fill(model.size * margins::KNEE_CLEARANCE);
         for (place, first) in self.numbered() {
             lower[first] += place.leg.shank.knee_radius;
-            let tube = place.leg.shank.tube_radius + margins::SHANK_CLEARANCE;
+            let tube = place.leg.shank.tube_radius + model.size * margins::SHANK_CLEARANCE;
             lower[first + 2..first + place.rows()].fill(tube);
         }
         upper.fill(f64::INFINITY);

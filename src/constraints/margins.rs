@@ -1,5 +1,5 @@
 //! By how much limits are tightened in the nonlinear program, so that they hold between its samples and on the full robot, and
-//! where each figure comes from.
+//! where each figure comes from. Lengths are for a robot of ANYmal's size ([`crate::robot::Robot::size`]), and are multiplied by that of others.
 //!
 //! Between two samples, a path with acceleration a leaves the straight line through them by up to a Δt²/8.
 

@@ -24,7 +24,7 @@ pub struct Reach {
     places: Vec<(usize, Instant)>,
 }
 
-/// Taken off the box on each side for foot `i` at an instant, m.
+/// Taken off the box on each side for foot `i` at an instant, m, for a robot of ANYmal's size.
 fn margin(model: &Model, i: usize, at: Instant) -> f64 {
     let Instant::Sample(k) = at else { return margins::REACH_SWINGING };
     let phase = &model.layout.phase[i];
@@ -67,7 +67,7 @@ impl Constraint for Reach {
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         for (r, &(i, at)) in self.places.iter().enumerate() {
             let reach = &model.reach[i];
-            let margin = margin(model, i, at);
+            let margin = model.size * margin(model, i, at);
             for c in 0..3 {
                 lower[3 * r + c] = reach.center[c] - reach.half_size[c] + margin;
                 upper[3 * r + c] = reach.center[c] + reach.half_size[c] - margin;

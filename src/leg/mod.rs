@@ -4,8 +4,8 @@ pub mod chain;
 pub mod jet;
 mod kinematics;
 mod planar;
+mod serial;
 mod spec;
 
-pub use kinematics::{Leg, ShankShape};
-pub use planar::PlanarPosture as LegPosture;
+pub use kinematics::{Leg, LegPosture, ShankShape};
 pub use spec::{JointSpec, LegSpec};

@@ -159,8 +159,8 @@ fn wrapped(angle: f64, near: f64) -> f64 {
 }
 
 impl<T: Scalar> PlanarPosture<T> {
-    /// The angles φ and κ, rad; their rates are those of HFE and KFE.
-    pub fn angles(&self) -> [T; 2] {
+    /// The angles φ and κ, rad; their rates are those of HFE and KFE, up to the sign.
+    pub fn swing_angles(&self) -> [T; 2] {
         [self.thigh[0].atan2(self.thigh[1]), self.bent[0].atan2(self.bent[1])]
     }
 
@@ -168,7 +168,7 @@ impl<T: Scalar> PlanarPosture<T> {
     pub fn joint_angles(&self) -> [T; 3] {
         let Counting { sign, zero, middle } = self.leg.counting;
         let [sin, cos] = self.abduction;
-        let [thigh, bent] = self.angles();
+        let [thigh, bent] = self.swing_angles();
         let counted = [sin.atan2(cos), -thigh + zero[0], -bent + zero[1]];
         std::array::from_fn(|j| {
             let angle = counted[j] * sign[j];
@@ -180,11 +180,6 @@ impl<T: Scalar> PlanarPosture<T> {
     fn in_base(&self, [forward, down]: [T; 2]) -> [T; 3] {
         let [sin, cos] = self.abduction;
         [forward, down * sin, -(down * cos)]
-    }
-
-    /// The knee, base frame from the center of mass, m. It has the lateral offset of the foot.
-    pub fn knee(&self) -> [T; 3] {
-        self.on_shank([0.0, 0.0])
     }
 
     /// A point of the shank, base frame from the center of mass, m, given along the line from the knee to
@@ -266,12 +261,12 @@ mod tests {
                 let contact = center + below;
                 assert!(leg.reaches(contact.into()));
                 let found = leg.posture::<f64>(contact.into());
-                let [thigh, bent] = found.angles();
+                let [thigh, bent] = found.swing_angles();
                 assert!(
                     (thigh - q[1]).abs() < 1e-3 && (bent - q[2]).abs() < 1e-3,
                     "{thigh} {bent} for {q:?}"
                 );
-                assert!((Vector3::from(found.knee()) - knee).norm() < 1e-3);
+                assert!((Vector3::from(found.on_shank([0.0; 2])) - knee).norm() < 1e-3);
                 // HFE and KFE rotate against the angles from straight down; the contact point rotates with the foot.
                 let axis = Rotation3::from_axis_angle(&Vector3::x_axis(), q[0]) * Vector3::y();
                 let step = 1e-6;
@@ -311,7 +306,7 @@ mod tests {
                     let expected = Vector3::from(placed.moved_by(j, contact.into()));
                     assert!((Vector3::from(column) - expected).norm() < 2e-3, "joint {j} at {q:?}");
                 }
-                let knee = Vector3::from(posture.knee());
+                let knee = Vector3::from(posture.on_shank([0.0; 2]));
                 let plane = Vector3::new(0.0, chain.foot.y, 0.0);
                 assert!((knee - Vector3::from(placed.point(2, &plane))).norm() < 1e-3);
             }
@@ -337,7 +332,11 @@ mod tests {
         for r in [[0.3, -0.1, -2.0], [0.3, -0.1, 0.02], [0.3, -0.3, 0.02], [2.0, 1.0, 1.0]] {
             assert!(!LEG.reaches(r));
             let found = LEG.posture::<f64>(r);
-            let numbers = found.angles().into_iter().chain(found.knee()).chain(found.jacobian().concat());
+            let numbers = found
+                .swing_angles()
+                .into_iter()
+                .chain(found.on_shank([0.0; 2]))
+                .chain(found.jacobian().concat());
             assert!(numbers.into_iter().all(f64::is_finite));
         }
     }

@@ -5,8 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, JOINTS, Joint};
-use super::kinematics::{Leg, ShankShape};
+use super::kinematics::{Kinematics, Leg, ShankShape};
 use super::planar::{Counting, Planar};
+use super::serial::Serial;
 
 /// By how much an axis may differ from a unit vector.
 const UNIT: f64 = 1e-3;
@@ -196,12 +197,12 @@ impl LegSpec {
             foot_radius: self.foot_radius,
             counting: Counting::default(),
         };
-        self.leg(kinematics, None, [closed.speed_limit; JOINTS], closed.torque_limit)
+        self.leg(Kinematics::Planar(kinematics), None, [closed.speed_limit; JOINTS], closed.torque_limit)
     }
 
     fn leg(
         &self,
-        kinematics: Planar,
+        kinematics: Kinematics,
         chain: Option<Chain>,
         speed_limit: [f64; JOINTS],
         torque_limit: [f64; JOINTS],
@@ -262,8 +263,10 @@ impl LegSpec {
             );
             return bad("stance", what);
         }
-        let Some(kinematics) = Planar::of_chain(&chain, stance, self.foot_radius) else {
-            return bad("joints", "axes other than x, y, y: there are no kinematics for such a leg yet");
+        let planar = Planar::of_chain(&chain, stance, self.foot_radius).map(Kinematics::Planar);
+        let serial = || Serial::new(&chain, stance, self.foot_radius).map(Kinematics::Serial);
+        let Some(kinematics) = planar.or_else(serial) else {
+            return bad("foot", "lies on the axis of the last joint, which cannot move it");
         };
         let speed_limit = chain.joints.map(|joint| joint.speed_limit);
         let torque_limit = chain.joints.map(|joint| joint.torque_limit);
@@ -272,7 +275,12 @@ impl LegSpec {
 
     /// Refuses keys of the closed form that contradict the joints.
     fn agree(&self, leg: &Leg, closed: &ClosedForm) -> Result<(), BadLeg> {
-        let found = leg.kinematics;
+        let Kinematics::Planar(found) = leg.kinematics else {
+            return bad(
+                "hip",
+                "given with joints whose axes are not x, y, y, which have no closed form; leave it out",
+            );
+        };
         let most = AGREEMENT * (found.thigh + found.shank);
         let hip = (Vector3::from(closed.hip) - Vector3::from(found.hip)).norm();
         let off = |key, given: f64, found: f64| (key, (given - found).abs() > most, found);

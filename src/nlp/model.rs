@@ -26,6 +26,8 @@ pub const UNDERSIDE: [usize; 2] = [5, 3];
 pub struct Model {
     /// kg.
     pub mass: f64,
+    /// Of the robot, in ANYmals.
+    pub size: f64,
     /// S = ½ tr(I) 1 − I, kg m²: the second moment of the mass, ∫ρ x xᵀ.
     pub second_moment: Matrix3<f64>,
     /// By foot, base frame, m.
@@ -73,6 +75,7 @@ impl Model {
             .collect();
         Self {
             mass: robot.mass,
+            size: robot.size(),
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),

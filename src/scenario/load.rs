@@ -16,7 +16,8 @@ pub struct LoadedScenario {
     pub scenario: Scenario,
     /// The robot that it names.
     pub robot: Robot,
-    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, all values with these applied.
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides or the robot is not of ANYmal's size, all values
+    /// with these, and with the lengths that go by its size.
     pub effective_text: String,
     /// The user's own text, exactly as it was read.
     pub source_text: String,
@@ -116,9 +117,11 @@ fn assemble(
     }
     let scenario = read(&document)?;
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
+    let by_size = set_by_size(&mut document, &scenario, robot.size())?;
+    let scenario = if by_size { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
     let effective_text = match overrides {
-        [] => source_text.clone(),
+        [] if !by_size => source_text.clone(),
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
@@ -132,6 +135,26 @@ fn assemble(
         document,
         file: None,
     })
+}
+
+/// Sets the lengths that the scenario leaves to the robot: the defaults, which are for ANYmal, times the robot's size. Whether there are any.
+fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Result<bool> {
+    let (motion, contact, map) = (&scenario.motion, &scenario.contact, &scenario.map);
+    let lengths = [
+        ("motion.swing_clearance", motion.swing_clearance),
+        ("motion.base_clearance", motion.base_clearance),
+        ("contact.edge_margin", contact.edge_margin),
+        ("map.thickness", map.thickness),
+    ];
+    let mut found = false;
+    for (key, default) in lengths {
+        if size != 1.0 && !document.has(key) {
+            let length = (1e4 * size * default).round() / 1e4;
+            document.set(&format!("{key}={length:?}"))?;
+            found = true;
+        }
+    }
+    Ok(found)
 }
 
 fn located(document: &Document, error: Error) -> Error {

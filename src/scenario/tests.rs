@@ -364,6 +364,32 @@ fn what_the_robot_does_not_allow_is_refused_with_its_line() {
     assert_eq!(message, "s.toml:10: gait.kind: not for this robot");
 }
 
+/// Clearances that the scenario does not give go by the robot's size, and the plan carries them.
+#[test]
+fn lengths_that_are_not_given_go_by_the_size_of_the_robot() {
+    let of = |robot: &str, rest: &str| {
+        let text = format!("{GOOD}[robot]\nname = \"{robot}\"\n{rest}");
+        load_text("s.toml", &text, Path::new("."), &[]).unwrap()
+    };
+    let anymal = of("anymal_c", "");
+    assert_eq!(anymal.robot.size(), 1.0);
+    assert_eq!(anymal.effective_text, anymal.source_text);
+    let small = of("solo12", "");
+    let size = small.robot.size();
+    assert!(size > 0.3 && size < 0.7, "{size}");
+    let lengths = |s: &Scenario| {
+        [s.motion.swing_clearance, s.motion.base_clearance, s.contact.edge_margin, s.map.thickness]
+    };
+    for (found, default) in lengths(&small.scenario).into_iter().zip(lengths(&anymal.scenario)) {
+        assert!((found - size * default).abs() < 1e-4, "{found} {default}");
+    }
+    let carried = parse("plan", &small.effective_text).unwrap();
+    assert_eq!(lengths(&carried), lengths(&small.scenario));
+    let given = of("solo12", "[motion]\nswing_clearance = 0.07\n").scenario.motion;
+    assert_eq!(given.swing_clearance, 0.07);
+    assert!((given.base_clearance - size * 0.1).abs() < 1e-4);
+}
+
 #[test]
 fn digests_are_those_of_what_was_read() {
     let robot = include_str!("../../robots/anymal_b.toml");

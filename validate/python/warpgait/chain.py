@@ -72,7 +72,7 @@ def chains(model: Any, index: Indices, stance: Array) -> list[Chain]:
                     position=anchor - before,
                     axis=data.xaxis[joint].copy(),
                     range=model.jnt_range[joint].copy(),
-                    speed_limit=index.speed_limit,
+                    speed_limit=float(index.speed_limit[e, j]),
                     torque_limit=float(index.torque_limit[e, j]),
                     mass=mass,
                     center=center - anchor,

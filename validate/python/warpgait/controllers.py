@@ -6,7 +6,7 @@ It uses a robot model of its own, the planned one, with measured positions and v
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import daqp
@@ -74,6 +74,19 @@ class Gains:
     least_normal_force: float = 5.0  # N, on feet that are not adhesive or do not touch the ground yet
 
 
+def gains_for(size: float) -> Gains:
+    """Gains for a robot of a size in ANYmals: lengths are proportional to it, forces to its cube, as weights are."""
+    g = Gains()
+    return replace(
+        g,
+        reach_down=size * g.reach_down,
+        seek=(size * g.seek[0], size * g.seek[1]),
+        touch_force=size**3 * g.touch_force,
+        step_over=(size * g.step_over[0], size * g.step_over[1]),
+        least_normal_force=size**3 * g.least_normal_force,
+    )
+
+
 class WholeBody:
     """Joint accelerations and stance forces from one quadratic program a control step.
 
@@ -91,7 +104,7 @@ class WholeBody:
         gains: Gains | None = None,
     ) -> None:
         """`adhesion` (K, E) N: how strongly each foot sticks, which adds to the normal force in the friction law."""
-        self.model, self.index, self.reference, self.gains = model, index, reference, gains or Gains()
+        self.model, self.index, self.reference, self.gains = model, index, reference, gains or gains_for(index.size)
         self.friction, self.adhesion = usable(friction), adhesion
         self.mass = float(model.body_mass.sum())
         self.failures = 0

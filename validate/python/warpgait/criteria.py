@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 
@@ -33,6 +33,10 @@ class Criterion:
     def sign(self) -> str:
         """≤, or ≥ where the limits are lower bounds."""
         return "≥" if self.at_least else "≤"
+
+    def for_size(self, size: float) -> Criterion:
+        """The same for a robot of a size in ANYmals: distances are proportional to it."""
+        return replace(self, passes=size * self.passes, marginal=size * self.marginal) if self.unit == "mm" else self
 
     def judge(self, value: float) -> Verdict:
         """NaN fails."""

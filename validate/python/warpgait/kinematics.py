@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of a leg with hip abduction (about x), hip flexion and knee flexion (both about y)."""
+"""Closed-form inverse kinematics of a leg with hip abduction (about x), hip flexion and knee flexion (both about y), in either sense."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from .arrays import Array, Bools
 from .errors import InputError
-from .model import JOINTS
+from .model import leg_joints
 
 _LEAST_DROP = 1e-8  # m², the least squared distance of a reached foot from the HAA axis, in the leg's plane
-_TOLERANCE = 1e-6  # of the direction of a joint axis, and, in m, of the height of a hip
+_TOLERANCE = 1e-6  # of the direction of a joint axis
 
 
 def _wrap(angle: Array) -> Array:
@@ -28,12 +28,14 @@ class Leg:
     name: str
     hip: Array  # (3,) a point on the HAA axis
     flexion_offset: float  # HFE forward (+x) of the HAA point
+    rise: float  # HFE above the HAA axis, at zero joint angles
     lateral: float  # foot to the left (+y) of the HAA axis
     thigh: float  # HFE to KFE, in the leg's plane
     shank: float  # KFE to the foot's center, in the leg's plane
     thigh_zero: float  # rad, from -z toward +x, at zero joint angles
     shank_zero: float
     bend: float  # +1: the shank points further forward than the thigh (front legs), -1: further back
+    signs: Array  # (3,) +1 for joints about +x and +y, -1 for those about -x and -y
     lower: Array  # (3,) rad
     upper: Array  # (3,) rad
 
@@ -46,23 +48,32 @@ class Leg:
         # Abduction brings the foot into the plane y = lateral; below the hip, hence the minus sign.
         drop2 = v[..., 1] ** 2 + v[..., 2] ** 2 - self.lateral**2
         reachable = drop2 > _LEAST_DROP
-        z = -np.sqrt(np.maximum(drop2, _LEAST_DROP))
-        haa = _wrap(np.arctan2(v[..., 2], v[..., 1]) - np.arctan2(z, self.lateral))
+        drop = -np.sqrt(np.maximum(drop2, _LEAST_DROP))
+        haa = np.arctan2(v[..., 2], v[..., 1]) - np.arctan2(drop, self.lateral)
         # Two links in the plane.
-        x = v[..., 0] - self.flexion_offset
+        x, z = v[..., 0] - self.flexion_offset, drop - self.rise
         cosine = (x * x + z * z - self.thigh**2 - self.shank**2) / (2 * self.thigh * self.shank)
         reachable &= np.abs(cosine) <= 1.0
         knee = self.bend * np.arccos(np.clip(cosine, -1.0, 1.0))
         thigh = np.arctan2(x, -z) - np.arctan2(self.shank * np.sin(knee), self.thigh + self.shank * np.cos(knee))
         # A positive rotation about +y turns -z toward -x, hence the signs.
-        hfe = _wrap(self.thigh_zero - thigh)
-        kfe = _wrap(self.shank_zero - self.thigh_zero - knee)
-        return np.stack([haa, hfe, kfe], -1), reachable
+        q = self.signs * np.stack([haa, self.thigh_zero - thigh, self.shank_zero - self.thigh_zero - knee], -1)
+        middle = (self.lower + self.upper) / 2
+        return middle + _wrap(q - middle), reachable
 
     def knee_angle(self, foot: Array) -> Array:
         """Angle between thigh and shank, rad: 0 stretched, π folded."""
         q, _ = self.inverse(foot)
-        return np.abs(_wrap(q[..., 2] - (self.shank_zero - self.thigh_zero)))
+        return np.abs(_wrap(self.signs[2] * q[..., 2] - (self.shank_zero - self.thigh_zero)))
+
+    def thigh_angle(self, q: Array) -> Array:
+        """Angle of the thigh from straight down in the leg's plane, rad, for joint angles (..., 3)."""
+        return np.abs(_wrap(self.thigh_zero - self.signs[1] * q[..., 1]))
+
+    @property
+    def length(self) -> float:
+        """Of thigh and shank, m."""
+        return self.thigh + self.shank
 
     def within_limits(self, q: Array) -> Bools:
         """Whether joint angles (..., 3) are within the limits."""
@@ -71,33 +82,36 @@ class Leg:
 
 
 def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
-    """The legs that end in `feet`; refuses a model with another kind of leg."""
+    """The legs that end in `feet`; refuses a model with another kind of leg. Knees bend as in the keyframe `stand`."""
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
     mujoco.mj_forward(model, data)
-    result = []
-    for name in feet:
-        ids = [model.joint(f"{name}_{j}").id for j in JOINTS]
-        haa, hfe, kfe = (data.xanchor[i].copy() for i in ids)
-        aligned = np.allclose(data.xaxis[ids], [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=_TOLERANCE)
-        if not aligned or abs(hfe[2] - haa[2]) > _TOLERANCE:
-            raise InputError(f"leg {name}: the inverse kinematics needs joint axes x, y, y at zero joint angles and a level hip")
-        foot = data.site(name).xpos.copy()
-        upper, lower = kfe - hfe, foot - kfe
-        front = haa[0] > 0
-        result.append(
-            Leg(
-                name=name,
-                hip=haa,
-                flexion_offset=float(hfe[0] - haa[0]),
-                lateral=float(foot[1] - haa[1]),
-                thigh=float(np.hypot(upper[0], upper[2])),
-                shank=float(np.hypot(lower[0], lower[2])),
-                thigh_zero=float(np.arctan2(upper[0], -upper[2])),
-                shank_zero=float(np.arctan2(lower[0], -lower[2])),
-                bend=1.0 if front else -1.0,
-                lower=model.jnt_range[ids, 0].copy(),
-                upper=model.jnt_range[ids, 1].copy(),
-            )
-        )
-    return result
+    return [_leg(model, data, name) for name in feet]
+
+
+def _leg(model: Any, data: Any, name: str) -> Leg:
+    ids = leg_joints(model, name)
+    haa, hfe, kfe = (data.xanchor[i].copy() for i in ids)
+    axes = data.xaxis[ids]
+    signs = np.sign(axes[[0, 1, 2], [0, 1, 1]])
+    if not np.allclose(axes, signs[:, None] * [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=_TOLERANCE):
+        raise InputError(f"leg {name}: the inverse kinematics of the replay needs joint axes x, y, y at zero joint angles")
+    foot = data.site(name).xpos.copy()
+    upper, lower = kfe - hfe, foot - kfe
+    thigh_zero, shank_zero = (float(np.arctan2(v[0], -v[2])) for v in (upper, lower))
+    stance = model.key("stand").qpos[model.jnt_qposadr[ids[2]]]
+    return Leg(
+        name=name,
+        hip=haa,
+        flexion_offset=float(hfe[0] - haa[0]),
+        rise=float(hfe[2] - haa[2]),
+        lateral=float(foot[1] - haa[1]),
+        thigh=float(np.hypot(upper[0], upper[2])),
+        shank=float(np.hypot(lower[0], lower[2])),
+        thigh_zero=thigh_zero,
+        shank_zero=shank_zero,
+        bend=1.0 if _wrap(shank_zero - thigh_zero - signs[2] * stance) >= 0 else -1.0,
+        signs=signs,
+        lower=model.jnt_range[ids, 0].copy(),
+        upper=model.jnt_range[ids, 1].copy(),
+    )

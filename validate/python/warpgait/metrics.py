@@ -6,7 +6,7 @@ Force metrics and the open loop are there because a whole-body controller tracks
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -213,6 +213,7 @@ def judge_closed_loop(
         _worst(t, off_net).metric(layer, criteria.NET_FORCE, float(np.sqrt((off_net**2).mean()))),
         _worst(t, off_feet, feet).metric(layer, criteria.FORCE_CORRELATION, forces.vertical_correlation),
     ]
+    metrics = [replace(m, criterion=m.criterion.for_size(index.size)) for m in metrics]
     incidents = _incidents_of(replay)
     incidents += _incidents_by_foot(layer, replay, planned, saturated.any(-1), index)
     incidents += _incidents_of_tracking(layer, t, com, turn, off_net)

@@ -1,9 +1,9 @@
 """Full robot models: where they are found, and what the rest of the package reads from them.
 
-A model is one MJCF file, `robots/NAME.xml`. Its custom numeric `joint_speed_limit` is in rad/s, and `joint_power_limit`, if it has one, in W. It
-has a free joint `root`, a body `base`, and for each foot `F` the joints `F_HAA`, `F_HFE`
-and `F_KFE`, motors with the same names, a spherical geom `F`, and a site `F` at its center. Names of bodies of that leg begin with `F`. A
-keyframe `stand` holds the nominal stance.
+A model is one MJCF file, `robots/NAME.xml`. It has a free joint `root`, a body `base`, and for each foot `F` a spherical geom `F`, a site `F` at
+its center, three hinges on the way from the base to it, and a motor for each hinge. Names of bodies of that leg begin with `F`. A keyframe
+`stand` holds the nominal stance. The custom numeric `joint_speed_limit` is in rad/s and `joint_power_limit`, if it has one, in W: one number for
+all joints, or one for each, leg by leg from the base down.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from .errors import InputError
 from .settings import MUJOCO_VERSION
 from .text import is_name
 
-JOINTS = ("HAA", "HFE", "KFE")  # of a leg, from the hip down: hip abduction, hip flexion, knee flexion
+JOINTS = 3  # of a leg
+ANYMAL_HEIGHT, SIZE_STEP = 0.43, 0.05  # m, of the ANYmals; sizes of robots are multiples of the step
 
 
 def check_mujoco() -> None:
@@ -85,6 +86,7 @@ class Indices:
     """Where things are in MuJoCo's arrays. E feet, in the order of `feet`."""
 
     feet: tuple[str, ...]
+    joints_of: tuple[tuple[str, ...], ...]  # names of the joints of each leg, from the base to the foot
     qpos: Integers  # (E, 3) joint positions
     qvel: Integers  # (E, 3) joint velocities
     actuator: Integers  # (E, 3) motors
@@ -94,13 +96,9 @@ class Indices:
     base: int  # base body
     radius: float  # m, of the feet
     torque_limit: Array  # (E, 3) N m
-    speed_limit: float  # rad/s
+    speed_limit: Array  # (E, 3) rad/s
     power_limit: Array  # (E, 3) W; where the model does not say, torque times speed
-
-    @property
-    def joints_of(self) -> list[list[str]]:
-        """Names of the joints of each leg, from the base to the foot."""
-        return [[f"{foot}_{joint}" for joint in JOINTS] for foot in self.feet]
+    size: float  # of the robot, in ANYmals
 
     @property
     def joint_names(self) -> list[str]:
@@ -139,28 +137,87 @@ def foot_names(model: Any) -> tuple[str, ...]:
     return tuple(model.site(i).name for i in range(model.nsite))
 
 
+def size_of(height: float) -> float:
+    """Size of a robot whose center of mass stands `height` m above its contact points, in ANYmals; the ANYmals have 1."""
+    return max(round(height / ANYMAL_HEIGHT / SIZE_STEP), 1) * SIZE_STEP
+
+
+def _standing_height(model: Any, sites: list[int]) -> float:
+    """Center of mass above the feet's centers in the nominal stance, m."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("stand").id)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return float(data.subtree_com[model.body("base").id, 2] - data.site_xpos[sites, 2].mean())
+
+
+def leg_joints(model: Any, foot: str) -> list[int]:
+    """The joints between the base and the body that carries the site `foot`, from the base down."""
+    found: list[int] = []
+    body, base = int(model.site_bodyid[model.site(foot).id]), model.body("base").id
+    while body not in (base, 0):
+        first = model.body_jntadr[body]
+        found[:0] = range(first, first + model.body_jntnum[body])
+        body = int(model.body_parentid[body])
+    hinges = all(model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE) for j in found)
+    if len(found) != JOINTS or not hinges:
+        names = ", ".join(model.joint(j).name for j in found) or "none"
+        raise InputError(f"leg {foot}: its joints are {names}; the replay needs {JOINTS} hinges between base and foot")
+    return found
+
+
+def motor_of(model: Any, joint: int) -> int:
+    """The actuator of a joint."""
+    at_joint = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    found = np.flatnonzero(at_joint & (model.actuator_trnid[:, 0] == joint))
+    if len(found) != 1:
+        raise InputError(f"joint {model.joint(joint).name}: has {len(found)} motors; the replay needs one")
+    return int(found[0])
+
+
+def numeric(model: Any, name: str) -> Array | None:
+    """The custom numbers `name` of a model, if it has them."""
+    return next((model.numeric(i).data.copy() for i in range(model.nnumeric) if model.numeric(i).name == name), None)
+
+
+def _by_joint(values: Array, shape: tuple[int, int], name: str) -> Array:
+    """One number for all joints, or one for each, as (E, J)."""
+    if values.size not in (1, shape[0] * shape[1]):
+        raise InputError(
+            f"the robot model's {name} has {values.size} numbers; allowed: 1, or {shape[0] * shape[1]}, one for each joint"
+        )
+    return np.broadcast_to(values if values.size == 1 else values.reshape(shape), shape).copy()
+
+
 def indices(model: Any, feet: tuple[str, ...]) -> Indices:
     """Look up the parts of `feet`, or name the missing one."""
     try:
-        joints = [[model.joint(f"{foot}_{j}") for j in JOINTS] for foot in feet]
-        motors = [[model.actuator(f"{foot}_{j}") for j in JOINTS] for foot in feet]
+        numbers = [leg_joints(model, foot) for foot in feet]
+        joints = [[model.joint(j) for j in leg] for leg in numbers]
+        motors = [[model.actuator(motor_of(model, j)) for j in leg] for leg in numbers]
         geoms = [model.geom(foot).id for foot in feet]
+        sites, radius = [model.site(foot).id for foot in feet], float(model.geom_size[geoms[0], 0])
         torque_limit = np.array([[m.ctrlrange[1] for m in leg] for leg in motors])
-        speed_limit = float(model.numeric("joint_speed_limit").data[0])
-        powers = [model.numeric(i).data[0] for i in range(model.nnumeric) if model.numeric(i).name == "joint_power_limit"]
+        shape = (len(feet), JOINTS)
+        speeds, powers = numeric(model, "joint_speed_limit"), numeric(model, "joint_power_limit")
+        if speeds is None:
+            raise InputError("the robot model lacks the custom numeric joint_speed_limit, rad/s")
+        speed_limit = _by_joint(speeds, shape, "joint_speed_limit")
         return Indices(
             feet=feet,
+            joints_of=tuple(tuple(j.name for j in leg) for leg in joints),
             qpos=np.array([[j.qposadr[0] for j in leg] for leg in joints]),
             qvel=np.array([[j.dofadr[0] for j in leg] for leg in joints]),
             actuator=np.array([[m.id for m in leg] for leg in motors]),
             geom=geoms,
-            site=[model.site(foot).id for foot in feet],
+            site=sites,
             body=[int(model.geom_bodyid[g]) for g in geoms],
             base=model.body("base").id,
-            radius=float(model.geom_size[geoms[0], 0]),
+            radius=radius,
             torque_limit=torque_limit,
             speed_limit=speed_limit,
-            power_limit=np.full_like(torque_limit, powers[0]) if powers else torque_limit * speed_limit,
+            size=size_of(_standing_height(model, sites) + radius),
+            power_limit=torque_limit * speed_limit if powers is None else _by_joint(powers, shape, "joint_power_limit"),
         )
     except KeyError as error:
         raise InputError(f"the robot model lacks a part that the replay needs (feet {', '.join(feet)}): {error}") from error

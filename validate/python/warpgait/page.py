@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from . import criteria
 from .criteria import Criterion, Metric, Verdict
 from .files import write_text
 from .metrics import FORCE_WINDOW, filtered_forces
-from .model import JOINTS
+from .model import JOINTS, Indices
 from .svg import Line, chart, contact_bars
 from .text import escape
 from .validation import Trial, Validation
@@ -89,12 +90,21 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
         lines = [Line(t, planned[:, e], "planned", "planned"), Line(t, simulated[:, e], "actual", "replayed")]
         parts.append(chart(f"Vertical force, {foot}", "N", lines, (), end))
     known = slice(2, -2)  # the open loop has no accelerations at the ends
-    for j, joint in enumerate(JOINTS):
+    for j in range(JOINTS):
+        joint = joint_title(v.index, j)
         limit = float(v.index.torque_limit[:, j].max())
         lines = [Line(v.plan.t[known], v.analysis.torque[known, e, j], f"foot{e % _COLORS} faint") for e, _ in feet]
         lines += [Line(t, r.torque[:, e, j], f"foot{e % _COLORS}", foot) for e, foot in feet]
         parts.append(chart(f"Torque {joint} (faint: open loop)", "N m", lines, (-limit, limit), end))
     return parts
+
+
+def joint_title(index: Indices, j: int) -> str:
+    """What the names of the joints number `j` of all legs have in common, such as HFE; or its number."""
+    names = [joints[j] for joints in index.joints_of]
+    words = [set(re.split(r"[_\-\s]+", name)) for name in names]
+    common = [word for word in re.split(r"[_\-\s]+", names[0]) if all(word in other for other in words) and word != "joint"]
+    return " ".join(common) if len(names) > 1 and common else f"of joint {j + 1}"
 
 
 def _head(v: Validation) -> list[str]:

@@ -19,7 +19,7 @@ class ReachRules:
     """What counts as reached, beyond the joint limits."""
 
     knee: tuple[float, float] = (0.35, 2.6)  # rad, least and greatest bend: neither stretched (singular) nor folded
-    flexion: float = float(np.deg2rad(100.0))  # rad, largest |HFE|
+    flexion: float = float(np.deg2rad(100.0))  # rad, of the thigh from straight down
     tilt: float = float(np.deg2rad(30.0))  # rad, of the ground
     side: float = 0.03  # m, of a foot inside its own quadrant
     clearance: float = 0.0  # m, between foot and trunk
@@ -42,11 +42,12 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
         q, possible = leg.inverse(center)
         knee = leg.knee_angle(center)
         ok &= possible & leg.within_limits(q) & (knee >= rules.knee[0]) & (knee <= rules.knee[1])
-        ok &= np.abs(q[..., 1]) <= rules.flexion
+        ok &= leg.thigh_angle(q) <= rules.flexion
         gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
         ok &= (gap > 0).any(-1)
-    side = np.sign([leg.hip[0], leg.hip[1]])
-    ok &= (contact[..., 0] * side[0] > rules.side) & (contact[..., 1] * side[1] > rules.side)
+    for axis in range(2):  # a leg in the middle has no side
+        if abs(leg.hip[axis]) > rules.side:
+            ok &= contact[..., axis] * np.sign(leg.hip[axis]) > rules.side
     return ok
 
 
@@ -89,8 +90,8 @@ def largest_cuboid(mask: Bools, least: tuple[int, int, int] = (1, 1, 1)) -> tupl
     return bounds
 
 
-def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float = 0.01) -> Box:
-    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m.
+def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float) -> Box | None:
+    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m; none if there is no such box.
 
     The grid points at both ends of the box are reached, so its edges are the distances between them.
     """
@@ -101,6 +102,6 @@ def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Arr
     cells = np.ceil(least / resolution - 1e-9).astype(int) + 1  # rounding must not add a cell
     bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])))
     if bounds is None:
-        raise ValueError(f"leg {leg.name} reaches no box of {least} m")
+        return None
     low, high = (np.array([axis[k] for axis, k in zip(axes, index, strict=True)]) for index in bounds)
     return Box((low + high) / 2, (high - low) / 2)

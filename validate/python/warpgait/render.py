@@ -21,6 +21,7 @@ from .files import replacing, write_bytes
 Image = npt.NDArray[np.uint8]
 
 CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION = 2.2, 125.0, -18.0  # m, degrees
+EXTENT = 1.5  # m, the ANYmals' `statistic extent`; the camera's distance goes by that of the model
 CAMERA_DROP = 0.2  # m: the camera looks this far below the center of mass, so that the ground is in the picture
 ARROW_LENGTH, ARROW_RADIUS = 0.8, 0.02  # m; the length is that of a force of m g
 ARROW_COLOR = np.array([0.1, 0.8, 0.2, 1.0], np.float32)  # green
@@ -46,14 +47,14 @@ def _encoder(target: Path, size: tuple[int, int], ffmpeg: str, frames_per_second
     return subprocess.Popen([ffmpeg, "-y", "-loglevel", "error", *frames, *film], stdin=subprocess.PIPE)
 
 
-def _arrows(scene: Any, points: Array, forces: Array) -> None:
-    """Planned forces (E, 3), as fractions of m g, as arrows at `points` (E, 3)."""
+def _arrows(scene: Any, points: Array, forces: Array, size: float) -> None:
+    """Planned forces (E, 3), as fractions of m g, as arrows at `points` (E, 3) of a robot of a size in ANYmals."""
     arrow = mujoco.mjtGeom.mjGEOM_ARROW
     for point, force in zip(points, forces, strict=True):
         if np.linalg.norm(force) > LEAST_FORCE and scene.ngeom < scene.maxgeom:
             geom = scene.geoms[scene.ngeom]
             mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), ARROW_COLOR)
-            mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, point, point + ARROW_LENGTH * force)
+            mujoco.mjv_connector(geom, arrow, size * ARROW_RADIUS, point, point + size * ARROW_LENGTH * force)
             scene.ngeom += 1
 
 
@@ -66,14 +67,15 @@ def _images(job: dict[str, Any]) -> Iterator[Image]:
     """The frames of a job, rendered by a camera that follows the robot."""
     model, frames = mujoco.MjModel.from_binary_path(job["model"]), np.load(job["frames"])
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
-    camera.distance, camera.azimuth, camera.elevation = CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION
+    size = model.stat.extent / EXTENT
+    camera.distance, camera.azimuth, camera.elevation = size * CAMERA_DISTANCE, CAMERA_AZIMUTH, CAMERA_ELEVATION
     with _renderer(job, model) as renderer:
         for qpos, look, points, forces in zip(*(frames[name] for name in ("qpos", "look", "point", "force")), strict=True):
             data.qpos[:] = qpos
             mujoco.mj_forward(model, data)
-            camera.lookat[:] = look - [0, 0, CAMERA_DROP]
+            camera.lookat[:] = look - [0, 0, size * CAMERA_DROP]
             renderer.update_scene(data, camera)
-            _arrows(renderer.scene, points, forces)
+            _arrows(renderer.scene, points, forces, size)
             yield renderer.render()
 
 

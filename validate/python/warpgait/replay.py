@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import Array, Bools
 
-CONTACT_FORCE = 3.0  # N: a foot with less force on it does not count as in contact
+CONTACT_FORCE = 3.0  # N, of a robot of ANYmal's size
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,10 @@ class Replay:
     controller_failures: int
     fall: Incident | None
     first_stray: Incident | None
+    contact_force: float = CONTACT_FORCE  # N: a foot with less force on it does not count as in contact
 
     @property
     def contact(self) -> Bools:
         """(K, E) feet with a contact force."""
-        touching: Bools = np.linalg.norm(self.force, axis=2) > CONTACT_FORCE
+        touching: Bools = np.linalg.norm(self.force, axis=2) > self.contact_force
         return touching

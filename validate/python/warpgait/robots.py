@@ -7,6 +7,7 @@ stance. The torso is the box around the trunk's collision shapes. `warpgait.reac
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -21,11 +22,26 @@ from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import write_text
 from .kinematics import Leg, legs
-from .model import Composite, available_models, check_mujoco, composite, find_model, foot_names, indices, load_spec, stand
+from .model import (
+    Composite,
+    available_models,
+    check_mujoco,
+    composite,
+    find_model,
+    foot_names,
+    indices,
+    load_spec,
+    numeric,
+    stand,
+)
 from .reach import Box, ReachRules, reach_box, reached
 
 LEAST_BOX = np.array([0.30, 0.20, 0.20])
-"""Least edges of a reach box, m: those of TOWR's ANYmal. Without them, the largest box is only 0.16 m high, too little for rough ground."""
+"""Least edges of a reach box, m, for a robot of ANYmal's size: those of TOWR's. Without them, the largest box is only 0.16 m high, too little for
+rough ground."""
+LEAST_FRACTIONS = (1.0, 0.8, 0.6, 0.4)  # of these edges, in this order, until the leg reaches such a box
+LEAST_ROOM = 0.01  # m, for a robot of ANYmal's size: of the nominal foot inside its box
+RESOLUTION, SIDE = 0.01, 0.03  # m, for a robot of ANYmal's size: of the grid of the reach set; of a foot inside its quadrant
 
 MIRROR_SAMPLES, MIRROR_FRACTION = 20_000, 0.999  # random points in a mirrored reach box, and the fraction that the leg must reach
 KNEE_DISTANCE = 0.01  # m: a shape of the thigh this close to the KFE axis is part of the knee
@@ -36,16 +52,18 @@ class CentroidalRobot:
     """The contents of a robot file. Everything is relative to the center of mass; base frame, SI."""
 
     name: str
+    source: str
     body: Composite
     torso: Box
     feet: tuple[str, ...]
     nominal: Array  # (E, 3) contact points
     reach: tuple[Box, ...]
-    shank: ShankShape
+    shanks: tuple[ShankShape, ...]
     legs: tuple[Chain, ...]  # the first joints relative to the base's origin, as the model has them
     radius: float  # m, of the feet
     gait_cycle: float | None  # s, if the model has one
     rules: ReachRules  # of the reach boxes
+    size: float  # in ANYmals
 
 
 @dataclass(frozen=True)
@@ -128,69 +146,122 @@ def trunk_box(model: Any) -> Box:
     return Box((low + high) / 2, (high - low) / 2)
 
 
-def derive(path: Path, rules: ReachRules | None = None, resolution: float = 0.01) -> CentroidalRobot:
-    """Everything the planner needs, from the model at `path`.
+def derive(path: Path) -> CentroidalRobot:
+    """Everything the planner needs, from the model at `path`."""
+    return derive_from(path.stem, load_spec(path))
 
-    The reach box of the first foot is mirrored to the others. Each mirrored box is then checked at random points.
-    """
-    rules = rules or ReachRules()
-    model = load_spec(path).compile()
+
+def reach_of(name: str, spec: Any) -> ReachSet:
+    """The reach boxes of the model `spec` of the robot `name`."""
+    model = spec.compile()
+    feet = foot_names(model)
+    index = indices(model, feet)
+    return reach_set(name, legs(model, feet), index.radius, trunk_box(model), index.size)
+
+
+def size_in(spec: Any) -> float:
+    """Size of the robot of a model in its nominal stance, in ANYmals."""
+    model = spec.compile()
+    return indices(model, foot_names(model)).size
+
+
+def derive_from(name: str, spec: Any, known: ReachSet | None = None) -> CentroidalRobot:
+    """Everything the planner needs, from the model `spec` of the robot `name`. `known`: of the same robot in another stance."""
+    model = spec.compile()
     data = mujoco.MjData(model)
     stand(model, data)
     feet = foot_names(model)
     index = indices(model, feet)
     body = composite(model, data)
     trunk = trunk_box(model)
-    all_legs = legs(model, feet)
-    first = reach_box(all_legs[0], index.radius, trunk, rules, LEAST_BOX, resolution)
-    boxes = []
-    for leg in all_legs:
-        mirror = np.append(np.sign(leg.hip[:2] * all_legs[0].hip[:2]), 1.0)
-        box = Box(first.center * mirror, first.half_size)
-        points = box.center + np.random.default_rng(0).uniform(-1, 1, (MIRROR_SAMPLES, 3)) * box.half_size
-        fraction = float(reached(leg, points, index.radius, trunk, rules).mean())
-        if fraction < MIRROR_FRACTION:
-            raise InputError(
-                f"{path}: leg {leg.name} is not a mirror image of {feet[0]}: it reaches only {fraction:.1%} of the box"
-            )
-        boxes.append(Box(box.center - body.center_of_mass, box.half_size))
     base = data.xpos[index.base] + body.center_of_mass
     nominal = data.site_xpos[index.site] - np.array([0, 0, index.radius]) - base
-    torso = Box(trunk.center - body.center_of_mass, trunk.half_size)
-    names = {model.numeric(i).name for i in range(model.nnumeric)}
+    reach = known or reach_of(name, spec)
+    boxes = [Box(b.center - body.center_of_mass, b.half_size) for b in reach.boxes]
+    for foot, place, box in zip(feet, nominal, boxes, strict=True):
+        if (np.abs(place - box.center) > box.half_size - LEAST_ROOM * reach.size).any():
+            raise InputError(
+                f"{name}: foot {foot}: in the stance it is at {np.round(place, 3).tolist()} m, at the edge of its reach box or outside it, "
+                f"{np.round(box.center, 3).tolist()} ± {np.round(box.half_size, 3).tolist()} m; give another stance"
+            )
+    cycle, texts = numeric(model, "gait_cycle"), {t.name: t.data for t in spec.texts}
     return CentroidalRobot(
-        name=path.stem,
+        name=name,
+        source=texts.get("source", "the MJCF model of the same name"),
         body=body,
-        torso=torso,
+        torso=Box(trunk.center - body.center_of_mass, trunk.half_size),
         feet=feet,
         nominal=nominal,
         reach=tuple(boxes),
-        shank=shank_shape(model, all_legs[0]),
+        shanks=tuple(shank_shape(model, leg) for leg in legs(model, feet)),
         legs=tuple(chains(model, index, data.qpos[index.qpos])),
         radius=index.radius,
-        gait_cycle=float(model.numeric("gait_cycle").data[0]) if "gait_cycle" in names else None,
-        rules=rules,
+        gait_cycle=None if cycle is None else float(cycle[0]),
+        rules=reach.rules,
+        size=reach.size,
     )
+
+
+@dataclass(frozen=True)
+class ReachSet:
+    """The reach boxes of a robot."""
+
+    boxes: tuple[Box, ...]  # by foot, from the base's origin
+    rules: ReachRules
+    size: float  # of the robot, in ANYmals
+
+
+def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: float) -> ReachSet:
+    """A box for each leg. A box is mirrored to the legs that reach all of its mirror image, and else computed."""
+    boxes: list[Box] = []
+    rules = ReachRules(side=SIDE * size)
+    for leg in all_legs:
+        for other, box in zip(all_legs, list(boxes), strict=False):
+            mirror = np.append(np.sign(leg.hip[:2] * other.hip[:2]), 1.0)
+            mirrored = Box(box.center * mirror, box.half_size)
+            points = mirrored.center + np.random.default_rng(0).uniform(-1, 1, (MIRROR_SAMPLES, 3)) * box.half_size
+            if reached(leg, points, radius, trunk, rules).mean() >= MIRROR_FRACTION:
+                boxes.append(mirrored)
+                break
+        else:
+            boxes.append(_largest_box(name, leg, radius, trunk, rules, size))
+    return ReachSet(tuple(boxes), rules, size)
+
+
+def _largest_box(name: str, leg: Leg, radius: float, trunk: Box, rules: ReachRules, size: float) -> Box:
+    """The largest box with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
+    for fraction in LEAST_FRACTIONS:
+        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, RESOLUTION * size)
+        if box is not None:
+            return box
+    least = LEAST_FRACTIONS[-1] * size * LEAST_BOX
+    raise InputError(f"{name}: leg {leg.name} reaches no box of {np.round(least, 3).tolist()} m within its joint limits")
 
 
 def _row(values: Array, digits: int = 3) -> str:
     return "[" + ", ".join(f"{v + 0.0:.{digits}f}" for v in np.round(values, digits)) + "]"
 
 
+def _digits(robot: CentroidalRobot) -> int:
+    """Of lengths: tenths of a millimeter for small robots."""
+    return 3 if robot.size > 0.9 else 4
+
+
 def _foot_lines(robot: CentroidalRobot, e: int) -> list[str]:
     """The table of foot number `e`."""
-    box, leg, center = robot.reach[e], robot.legs[e], robot.body.center_of_mass
+    box, leg, center, shank = robot.reach[e], robot.legs[e], robot.body.center_of_mass, robot.shanks[e]
+    digits = _digits(robot)
     return [
         "",
         "[[feet]]",
         f'name = "{robot.feet[e]}"',
-        f"nominal = {_row(robot.nominal[e])}              # m",
-        f"reach = {{ center = {_row(box.center)}, half_size = {_row(box.half_size)} }}   # m",
+        f"nominal = {_row(robot.nominal[e], digits)}              # m",
+        f"reach = {{ center = {_row(box.center, digits)}, half_size = {_row(box.half_size, digits)} }}   # m",
         "[feet.leg]",
-        f"knee_radius = {robot.shank.knee_radius:.4f}                        # m",
-        f"corner = {_row(np.array(robot.shank.corner), 4)}                  # m, of the shank, from the knee",
-        f"tube = {_row(np.array(robot.shank.tube), 4)}                    # m, upper end of the axis of the shank's tube, which leads to the foot",
-        f"tube_radius = {robot.shank.tube_radius:.4f}                        # m",
+        f"knee_radius = {shank.knee_radius:.4f}                        # m",
+        f"corner = {_row(np.array(shank.corner), 4)}                  # m, of the shank, from the knee",
+        f"tube = {_row(np.array(shank.tube), 4)}                    # m, upper end of the axis of the shank's tube, which leads to the foot",
+        f"tube_radius = {shank.tube_radius:.4f}                        # m",
         f"foot_radius = {robot.radius:g}                         # m",
         f"foot = {_row(leg.foot, 6)}        # m, its center from the last joint",
         f"stance = {_row(leg.stance, 4)}             # rad",
@@ -218,23 +289,24 @@ def _joint_lines(joint: Joint, origin: Array) -> list[str]:
 def to_toml(robot: CentroidalRobot) -> str:
     """The robot file's text."""
     rules, (knee_least, knee_most) = robot.rules, robot.rules.knee
+    digits = _digits(robot)
     lines = [
         f"# Derived from robots/{robot.name}.xml by `python -m warpgait.robots {robot.name}`. To change it, edit the model and run that again.",
         "# Base frame: x forward, y left, z up; everything is relative to the center of mass, which is in the model's base frame at",
         f"# {_row(robot.body.center_of_mass, 4)} m in the nominal stance. Feet are contact points, one foot radius ({robot.radius:g} m) below the foot's center.",
         f'name = "{robot.name}"',
-        'source = "ANYbotics\' URDF (BSD-3), through the MJCF model of the same name"',
+        f"source = {json.dumps(robot.source, ensure_ascii=False)}",
         f"mass = {robot.body.mass:.6g}                                # kg",
         "inertia = [                                    # kg m², about the center of mass, nominal stance",
         *(f"  {_row(row, 6)}," for row in robot.body.inertia),
         "]",
         *([] if robot.gait_cycle is None else [f"gait_cycle = {robot.gait_cycle:.2f}                              # s, default"]),
         "# The box around the trunk's collision shapes, m.",
-        f"torso = {{ center = {_row(robot.torso.center)}, half_size = {_row(robot.torso.half_size)} }}",
+        f"torso = {{ center = {_row(robot.torso.center, digits)}, half_size = {_row(robot.torso.half_size, digits)} }}",
         "",
         "# Reach: the largest box of contact points within the joint limits, with the knee bent by "
-        f"{knee_least:g}–{knee_most:g} rad, |HFE| ≤ {np.degrees(rules.flexion):.0f}°, and the foot",
-        f"# clear of the trunk, on ground tilted by up to {np.degrees(rules.tilt):.0f}°. Its edges are at least {_row(LEAST_BOX, 2)} m.",
+        f"{knee_least:g}–{knee_most:g} rad, the thigh within {np.degrees(rules.flexion):.0f}° of straight down, and the",
+        f"# foot clear of the trunk, on ground tilted by up to {np.degrees(rules.tilt):.0f}°. Its edges are at least {_row(robot.size * LEAST_BOX, 2)} m where possible.",
         "# Joints: position from the one before (the first: from the center of mass), m; axis; range, rad; speed_limit, rad/s; torque_limit, N m;",
         "# and of the link that the joint moves: mass, kg; center of mass from the joint, m; inertia about it, xx yy zz xy xz yz, kg m².",
     ]

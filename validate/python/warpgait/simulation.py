@@ -18,13 +18,13 @@ from .controllers import LATENCY, WholeBody
 from .geometry import rotation_vector
 from .model import Indices, foot_of
 from .reference import Reference
-from .replay import Incident, Replay
+from .replay import CONTACT_FORCE, Incident, Replay
 from .settings import Disturbance
 
 SETTLING_TIME = 0.6  # s: the robot stands at the first sample before the plan's clock starts
 INITIAL_DEPTH = 5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that all touch
 TILT_LIMIT = np.deg2rad(35.0)  # between the trunk's vertical axis and the planned one; more is a fall
-OFFSET_LIMIT = 0.5  # m, of the center of mass from the planned one; more is a fall, whatever the trunk's attitude
+OFFSET_LIMIT = 0.5  # m, for a robot of ANYmal's size, of the center of mass from the planned one; more is a fall, whatever the trunk's attitude
 
 # Standard deviations of the sensor noise at `Disturbance.noise` = 1.
 POSITION_NOISE = 1e-3  # m, base
@@ -222,7 +222,7 @@ class Simulation:
         offset = math.dist(self._reference.com[k], com)
         if tilt > TILT_LIMIT:
             self._fall = Incident(time, f"fall: the trunk tilts {np.degrees(tilt):.0f}° from the plan")
-        elif offset > OFFSET_LIMIT:
+        elif offset > OFFSET_LIMIT * self._index.size:
             self._fall = Incident(time, f"fall: the center of mass is {offset:.2f} m from the plan")
 
     def _replay(self) -> Replay:
@@ -232,4 +232,5 @@ class Simulation:
             controller_failures=self._controller.failures,
             fall=self._fall,
             first_stray=self._first_stray,
+            contact_force=CONTACT_FORCE * self._index.size**3,
         )

@@ -1,0 +1,409 @@
+"""`warpgait robot import FILE`: from a URDF or MJCF to `NAME.toml` (for the planner) and `NAME.xml` (for the replay).
+
+MuJoCo's compiler reads the file. Feet, joints, stance, mass, torso and reach are found by computation and printed; what the file does not say,
+such as the speed limits of an MJCF, is asked for by an option.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from . import stance as stances
+from .arrays import Array
+from .console import ERROR, complain, emit, run
+from .errors import InputError
+from .files import ensure_outputs, write_text
+from .mjcf import foot_names, order, write_mjcf
+from .model import check_mujoco
+from .robots import CentroidalRobot, derive_from, reach_of, size_in, to_toml
+from .skeleton import Leg, Link, Reader, Shape, Skeleton, find_feet, leg_of
+from .text import is_name, visible
+from .urdf import Limits, read_urdf
+
+LARGEST_FILE = 64 << 20  # bytes
+CYCLE, CYCLE_LENGTH = (
+    1.2,
+    0.6125,
+)  # s, m: the cycle of ANYmal C and the length of its legs; cycles grow with the root of the length
+KEYS = ("stand", "home", "stance", "standing")  # names of keyframes that are a stance, best first
+STANCE_ROUNDS = 4  # of stance and reach boxes
+TRIM = 0.25  # of the foot's radius: a shape of the shank that is not at least this much higher than the foot's lowest point is left out
+
+
+def read(path: Path, options: argparse.Namespace) -> Skeleton:
+    """The robot in a file, up to its stance."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path}: larger than {LARGEST_FILE >> 20} MiB; no robot's description is")
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from error
+    try:
+        tag = ET.fromstring(content).tag
+    except ET.ParseError as error:
+        raise InputError(f"{path}:{error.position[0]}: not XML: {error}") from error
+    notes: list[str] = []
+    mimics: dict[str, str] = {}
+    limits: dict[str, Limits] | None = None
+    if tag == "robot":
+        urdf = read_urdf(path, content, options.without_meshes)
+        notes, mimics, limits = urdf.notes, urdf.mimics, urdf.limits
+        model = _compile(path, lambda: _floating(urdf.text))
+    elif tag == "mujoco":
+        model = _compile(path, lambda: _without_visuals(path, options.without_meshes, notes))
+        _refuse_loops(path, model)
+        limits = _limits_of(model)
+    else:
+        raise InputError(f"{path}: the root element is <{visible(tag)}>; allowed: <robot> (URDF) or <mujoco> (MJCF)")
+    reader = Reader(path, model, limits, mimics, notes)
+    return _skeleton(reader, options)
+
+
+def _compile(path: Path, make: Any) -> Any:
+    """The compiled model; what MuJoCo objects to is the user's error."""
+    try:
+        return make().compile()
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
+
+
+def _floating(text: str) -> Any:
+    """The model of a URDF, whose root link floats."""
+    spec = mujoco.MjSpec.from_string(text)
+    spec.worldbody.first_body().add_freejoint()
+    return spec
+
+
+def _without_visuals(path: Path, without_meshes: bool, notes: list[str]) -> Any:
+    """The model of an MJCF without shapes that touch nothing, whose meshes need not be there; `without_meshes`: without all meshes."""
+    spec = mujoco.MjSpec.from_file(str(path))
+    mesh = int(mujoco.mjtGeom.mjGEOM_MESH)
+    for geom in [g for g in spec.geoms if int(g.type) == mesh]:
+        collides = bool(geom.contype or geom.conaffinity)
+        has_mass = geom.parent.explicitinertial == 0
+        if collides and without_meshes:
+            notes.append(f'link "{geom.parent.name}": its collision mesh {geom.meshname} is left out')
+        if (without_meshes or not collides) and not has_mass:
+            spec.delete(geom)
+    used = {g.meshname for g in spec.geoms if int(g.type) == mesh}
+    for unused in [m for m in spec.meshes if m.name not in used]:
+        spec.delete(unused)
+    return spec
+
+
+def _refuse_loops(path: Path, model: Any) -> None:
+    loops = [int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)]
+    for e in range(model.neq):
+        if model.eq_type[e] in loops and model.eq_active0[e]:
+            name = model.equality(e).name or f"number {e}"
+            raise InputError(f'{path}: equality "{name}": closed loops are not supported; remove it')
+
+
+def _limits_of(model: Any) -> dict[str, Limits]:
+    """Ranges and torques of an MJCF's joints. It has no speed limits."""
+    found: dict[str, Limits] = {}
+    for j in range(model.njnt):
+        limits = Limits()
+        if model.jnt_limited[j]:
+            limits.range = (float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1]))
+        torques = [float(np.abs(model.jnt_actfrcrange[j]).max())] if model.jnt_actfrclimited[j] else []
+        for a in np.flatnonzero((model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (model.actuator_trnid[:, 0] == j)):
+            gear = abs(float(model.actuator_gear[a, 0]))
+            if model.actuator_forcelimited[a]:
+                torques.append(gear * float(np.abs(model.actuator_forcerange[a]).max()))
+            if model.actuator_ctrllimited[a] and model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE):
+                torques.append(gear * float(model.actuator_gainprm[a, 0]) * float(np.abs(model.actuator_ctrlrange[a]).max()))
+        limits.torque = min((t for t in torques if t > 0), default=None)
+        found[str(model.joint(j).name)] = limits
+    return found
+
+
+def _key(reader: Reader) -> dict[str, float]:
+    """Joint angles of the keyframe that is most likely a stance."""
+    m = reader.model
+    names = [m.key(k).name for k in range(m.nkey)]
+    best = next((names.index(name) for name in KEYS if name in names), 0 if names else None)
+    if best is None:
+        return {}
+    hinges = [j for j in range(m.njnt) if m.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE)]
+    return {reader.joint_name(j): float(m.key(best).qpos[m.jnt_qposadr[j]]) for j in hinges}
+
+
+def _posture(reader: Reader, key: dict[str, float], central: float) -> Array:
+    """All positions (nq,): each joint at the keyframe's angle, or in its range: from as near to zero as it goes (0) to the middle (1)."""
+    m = reader.model
+    q = np.zeros(m.nq)
+    q[int(m.jnt_qposadr[reader.free]) + 3] = 1
+    for j in range(m.njnt):
+        name = reader.joint_name(j)
+        limits = reader.limits.get(name, Limits()).range
+        angle = 0.0 if limits is None else central * float(np.mean(limits)) + (1 - central) * float(np.clip(0.0, *limits))
+        if m.jnt_type[j] in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+            q[int(m.jnt_qposadr[j])] = key.get(name, angle)
+    return q
+
+
+def _frozen(words: list[str]) -> dict[str, float]:
+    """The joints of --freeze JOINT=ANGLE."""
+    found = {}
+    for word in words:
+        name, _, angle = word.partition("=")
+        try:
+            found[name] = float(angle or 0)
+        except ValueError as error:
+            raise InputError(f"--freeze {visible(word)}: allowed: JOINT or JOINT=ANGLE, rad") from error
+    return found
+
+
+def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
+    m, key = reader.model, _key(reader)
+    postures = [_posture(reader, key, central) for central in (0.0, 0.5, 1.0)]
+    names = [reader.joint_name(j) for j in range(m.njnt)]
+    for name, angle in _frozen(options.freeze).items():
+        if name not in names:
+            raise InputError(f'--freeze: {reader.path} has no joint "{visible(name)}"; its joints are {", ".join(names)}')
+        reader.freeze(names.index(name), angle)
+    wanted = [name for word in options.feet for name in word.split(",") if name]
+    leaves = find_feet(reader, wanted, postures)
+    of_legs = {j for leaf in leaves for j in reader.joints_above(leaf)}
+    held = []
+    for j in range(m.njnt):
+        if j != reader.free and j not in of_legs and j not in reader.frozen:
+            if m.jnt_type[j] not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+                raise InputError(f'{reader.path}: joint "{names[j]}" is a ball; only hinges and sliding joints can be held still')
+            reader.freeze(j, float(postures[0][int(m.jnt_qposadr[j])]))
+            held.append(names[j])
+    if held:
+        reader.notes.append(f"held still, because they belong to no leg: {', '.join(held)}")
+    shared = [j for j in of_legs if sum(j in reader.joints_above(leaf) for leaf in leaves) > 1]
+    if shared:
+        raise InputError(
+            f'{reader.path}: joint "{names[shared[0]]}" moves more than one leg; hold it still: --freeze {names[shared[0]]}'
+        )
+    reader.pose()
+    radius = options.foot_radius
+    legs = [leg_of(reader, leaf, set(wanted), radius) for leaf in leaves]
+    legs = [replace(leg, links=[_limited(reader, link, k, options) for k, link in enumerate(leg.links)]) for leg in legs]
+    largest = max(leg.radius for leg in legs)
+    if any(leg.radius < 0.99 * largest for leg in legs):
+        reader.notes.append(f"the feet differ; all get the largest radius, {largest:.4g} m")
+    legs = [replace(leg, radius=largest) for leg in legs]
+    return Skeleton(reader.path, reader.link(reader.base, None), legs, reader.notes, key)
+
+
+def _limited(reader: Reader, link: Link, k: int, options: argparse.Namespace) -> Link:
+    """The link with limits from the options where the file has none; refuses one that is left without."""
+    limits = replace(link.limits)
+    for name, flag, unit in (("speed", "--speed-limit", "RAD/S"), ("torque", "--torque-limit", "NM")):
+        given = options.speed_limit if name == "speed" else options.torque_limit
+        if given:
+            setattr(limits, name, given[k] if len(given) == 3 else given[0])
+        if not (getattr(limits, name) or 0) > 0:
+            raise InputError(
+                f'{reader.path}: joint "{link.joint}": the file has no {name} limit; give it: {flag} {unit}, or {flag} A,B,C for the joints of a leg from the base down'
+            )
+    if limits.range is None and options.range is None:
+        raise InputError(
+            f'{reader.path}: joint "{link.joint}": it has no limits; give them for such joints: --range LEAST,GREATEST, rad'
+        )
+    if limits.range is None:
+        limits.range = (options.range[0], options.range[1])
+    return replace(link, limits=limits)
+
+
+def _shape_at(shape: Shape, link: Link, frame: tuple[Array, Array]) -> Shape:
+    """A shape of a link in the posture in which the link's joint is at `frame`."""
+    R, at = frame
+    return replace(shape, center=at + R @ (shape.center - link.anchor), rotation=R @ shape.rotation)
+
+
+def _trim(skeleton: Skeleton, leg: Leg, q: Array) -> Leg:
+    """Leave out shapes of the shank that would touch the ground with the foot."""
+    foot, frames = stances.place(leg, q)
+    last, floor = leg.links[-1], foot[2] - leg.radius
+    kept = [s for s in last.shapes if _shape_at(s, last, frames[-1]).lowest() > floor + TRIM * leg.radius]
+    if len(kept) < len(last.shapes):
+        skeleton.notes.append(
+            f'link "{last.body}": {len(last.shapes) - len(kept)} of its shapes reach as low as the foot and are left out'
+        )
+    return replace(leg, links=[*leg.links[:-1], replace(last, shapes=kept)])
+
+
+def _trunk(base: Link, legs: list[Leg], notes: list[str]) -> Link:
+    """The base, with a box around the hips where the file has no collision shapes of it."""
+    if base.shapes:
+        return base
+    hips = np.array([leg.links[0].anchor for leg in legs])
+    low, high = hips.min(0), hips.max(0)
+    half = np.maximum((high - low) / 2, 0.05 * np.ptp(hips[:, 0]) + 0.02)
+    notes.append(f'link "{base.body}": it has no collision shapes; a box around the hips takes their place')
+    return replace(base, shapes=[Shape("box", (low + high) / 2, np.eye(3), half)])
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A robot, ready to be written."""
+
+    model: str  # the text of NAME.xml
+    robot: CentroidalRobot
+    skeleton: Skeleton
+    source: str  # of the stance
+
+
+def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
+    """Read a file and derive the robot. A computed stance is then moved to the middle of the reach boxes."""
+    skeleton = read(path, options)
+    if options.stance:
+        source, q = "--stance", stances.given(skeleton, options.stance)
+    else:
+        found = stances.of_key(skeleton)
+        source, q = ("keyframe", found) if found is not None else ("computed", stances.computed(skeleton.legs))
+    stances.judge(skeleton, q, source)
+    feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
+    sequence = order(feet)
+    skeleton.legs = [_trim(skeleton, skeleton.legs[e], q[e]) for e in sequence]
+    skeleton.base = _trunk(skeleton.base, skeleton.legs, skeleton.notes)
+    q, feet = [q[e] for e in sequence], [feet[e] for e in sequence]
+    lengths = [
+        np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor)
+        for leg in skeleton.legs
+    ]
+    cycle = round(20 * CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH))) / 20
+    words = options.source or f"from {path.name}"
+    names = foot_names(feet)
+
+    def model_in(q: list[Array]) -> tuple[str, Any]:
+        feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
+        height = max(leg.radius - float(foot[2]) for leg, foot in zip(skeleton.legs, feet, strict=True))
+        text = write_mjcf(skeleton, name, names, q, height, cycle, words)
+        return text, mujoco.MjSpec.from_string(text)
+
+    text, spec = model_in(q)
+    reach = reach_of(name, spec)
+    if source == "computed":
+        for _ in range(STANCE_ROUNDS):  # the boxes depend on the robot's size, and that on the stance
+            text, spec = model_in(stances.inside(skeleton.legs, q, reach.boxes))
+            if reach.size == size_in(spec):
+                break
+            reach = reach_of(name, spec)
+    # The robot file is derived from the very text of the model.
+    return Imported(text, derive_from(name, spec, reach), skeleton, source)
+
+
+def _table(skeleton: Skeleton, robot: CentroidalRobot, source: str) -> list[str]:
+    """What was found, for people."""
+    lines = [
+        f"mass {robot.body.mass:.4g} kg, center of mass {np.round(robot.body.center_of_mass, 4).tolist()} m from the base's origin ({skeleton.base.body})",
+        f"torso {np.round(2 * robot.torso.half_size, 3).tolist()} m; stance ({source}) {-robot.nominal[:, 2].mean():.3f} m high; cycle {robot.gait_cycle:g} s",
+    ]
+    for e, (foot, leg) in enumerate(zip(robot.feet, skeleton.legs, strict=True)):
+        box = 2 * robot.reach[e].half_size
+        lines.append(
+            f"{foot}: link {leg.foot_body}, radius {leg.radius:.4g} m, at {np.round(robot.nominal[e], 3).tolist()} m, reach box {np.round(box, 3).tolist()} m"
+        )
+        for link, angle in zip(leg.links, robot.legs[e].stance, strict=True):
+            low, high = link.limits.range or (0.0, 0.0)
+            lines.append(
+                f"    {link.joint}: axis {np.round(link.axis, 3).tolist()}, {low:.3g} to {high:.3g} rad, stance {angle:.3g}, "
+                f"{link.limits.speed:g} rad/s, {link.limits.torque:g} N m, link {link.mass:.3g} kg"
+            )
+    return lines + [f"note: {note}" for note in skeleton.notes]
+
+
+def _numbers(text: str) -> list[float]:
+    """Numbers with commas or blanks between them."""
+    values = [float(word) for word in text.replace(",", " ").split()]
+    if not values or not np.isfinite(values).all():
+        raise ValueError(text)
+    return values
+
+
+def arguments(words: list[str] | None) -> argparse.Namespace:
+    """The options of the command."""
+    parser = argparse.ArgumentParser(prog="warpgait robot import", description="From a URDF or MJCF to NAME.toml and NAME.xml.")
+    parser.add_argument("file", type=Path, help="a .urdf, or an .xml of MuJoCo")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="DIR/NAME of the two files (default: the name of FILE, in the working folder)"
+    )
+    parser.add_argument(
+        "--feet", action="append", default=[], metavar="LINK,…", help="links that are feet (default: those that reach the ground)"
+    )
+    parser.add_argument(
+        "--foot-radius", type=float, metavar="M", help="radius of the feet, m (default: that of the file's shapes)"
+    )
+    parser.add_argument(
+        "--stance",
+        type=_numbers,
+        metavar="Q,…",
+        help="joint angles of the stance, rad: three for every leg, or three for each, in the file's order",
+    )
+    parser.add_argument(
+        "--speed-limit",
+        type=_numbers,
+        metavar="V",
+        help="of the joints, rad/s: one, or three from the base down; replaces the file's",
+    )
+    parser.add_argument(
+        "--torque-limit",
+        type=_numbers,
+        metavar="T",
+        help="of the joints, N m: one, or three from the base down; replaces the file's",
+    )
+    parser.add_argument("--range", type=_numbers, metavar="A,B", help="range of joints without limits, rad")
+    parser.add_argument("--freeze", action="append", default=[], metavar="JOINT=Q", help="hold a joint still at an angle, rad")
+    parser.add_argument("--without-meshes", action="store_true", help="leave out collision shapes whose meshes are not there")
+    parser.add_argument("--source", help="where the file is from and its license, for the two files")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    options = parser.parse_args(words)
+    for name, allowed in (("speed_limit", (1, 3)), ("torque_limit", (1, 3)), ("range", (2,))):
+        given = getattr(options, name)
+        if given is not None and len(given) not in allowed:
+            parser.error(f"--{name.replace('_', '-')}: {len(given)} numbers; allowed: {' or '.join(map(str, allowed))}")
+    if options.foot_radius is not None and not 1e-3 <= options.foot_radius <= 1:
+        parser.error(f"--foot-radius {options.foot_radius:g}: allowed: 0.001 to 1 m")
+    if options.range and options.range[0] >= options.range[1]:
+        parser.error("--range: the least angle comes first")
+    return options
+
+
+def import_robot(options: argparse.Namespace) -> int:
+    """Write the two files, and print what was found."""
+    output = options.output or Path(options.file.stem)
+    name = output.name
+    if not is_name(name) or name.endswith((".toml", ".xml")):
+        raise InputError(f"{visible(name)!r} is not the name of a robot; -o takes DIR/NAME, without ending")
+    targets = [output.with_name(f"{name}.{ending}") for ending in ("xml", "toml")]
+    ensure_outputs(targets, [options.file])
+    found = build(options.file, name, options)
+    robot, notes = found.robot, found.skeleton.notes
+    for target, content in zip(targets, (found.model, to_toml(robot)), strict=True):
+        write_text(target, content)
+    if options.json:
+        emit(json.dumps({"files": [str(t) for t in targets], "mass": robot.body.mass, "feet": robot.feet, "notes": notes}))
+    elif not options.quiet:
+        emit("\n".join([*_table(found.skeleton, robot, found.source), *(f"wrote {target}" for target in targets)]))
+    return 0
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the command; returns 0, or 2 on bad input."""
+    options = arguments(words)
+    try:
+        check_mujoco()
+        return import_robot(options)
+    except (InputError, OSError) as error:
+        complain(error)
+        return ERROR
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(main))

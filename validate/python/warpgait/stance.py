@@ -1,0 +1,145 @@
+"""The nominal stance of an imported robot: given, of a keyframe, or computed."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from .arrays import Array
+from .errors import InputError
+from .reach import Box
+from .skeleton import Leg, Skeleton
+
+STRETCH = 0.72  # height of the hip above the foot in a computed stance, in lengths of the leg from there: about ANYmal's
+AT_LIMIT = 0.02  # rad inside its range that a computed stance keeps each joint
+CENTRAL = 0.4  # of half a reach box: how far a foot stands from its middle, along x and y
+REACHED = 1e-5  # m
+_STARTS = 6  # of the search along each joint
+
+
+def turned(axis: Array, angle: float) -> Array:
+    """The rotation (3, 3) about a unit vector."""
+    x, y, z = axis
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    R: Array = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return R
+
+
+def place(leg: Leg, q: Array) -> tuple[Array, list[tuple[Array, Array]]]:
+    """The center of the foot, and the rotation and place of each link's joint, for joint angles q (3,); from the base's origin."""
+    R, at, before = np.eye(3), np.zeros(3), np.zeros(3)
+    frames = []
+    for link, angle in zip(leg.links, q, strict=True):
+        at = at + R @ (link.anchor - before)
+        R, before = R @ turned(link.axis, angle), link.anchor
+        frames.append((R, at))
+    return at + R @ (leg.foot - before), frames
+
+
+def ranges(leg: Leg) -> Array:
+    """Least and greatest angles (3, 2) rad; refuses joints without."""
+    rows = [link.limits.range for link in leg.links]
+    return np.array([row if row is not None else (-np.pi, np.pi) for row in rows])
+
+
+def computed(legs: list[Leg]) -> list[Array]:
+    """Stances with each foot under its hip, all at one height: the joint angles nearest to the middle of their ranges that do it."""
+    lengths = [
+        float(np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor))
+        for leg in legs
+    ]
+    height = min(leg.links[1].anchor[2] - STRETCH * length - leg.radius for leg, length in zip(legs, lengths, strict=True))
+    return [_under_hip(leg, np.array([leg.links[1].anchor[0], leg.foot[1], height + leg.radius])) for leg in legs]
+
+
+def inside(legs: list[Leg], rough: list[Array], boxes: tuple[Box, ...]) -> list[Array]:
+    """A computed stance `rough`, moved so that each foot is well inside its reach box (from the base's origin), all at one height."""
+    height = float(np.mean([box.center[2] for box in boxes]))
+    result = []
+    for leg, q, box in zip(legs, rough, boxes, strict=True):
+        foot, room = place(leg, q)[0], CENTRAL * box.half_size
+        target = np.clip(foot, box.center - room, box.center + room)
+        target[2] = height + leg.radius
+        found = _solved(leg, q, target)
+        if found is None:
+            raise InputError(
+                f'leg "{leg.foot_body}": it does not reach the middle of its reach box; give the joint angles of a stance: --stance'
+            )
+        result.append(found)
+    return result
+
+
+def _solved(leg: Leg, start: Array, target: Array) -> Array | None:
+    """Joint angles near `start` that put the center of the foot at `target`, if the leg reaches it."""
+    low, high = _bounds(leg)
+    result = least_squares(
+        lambda q: place(leg, q)[0] - target, np.clip(start, low, high), bounds=(low, high), xtol=1e-12, ftol=1e-12
+    )
+    return result.x if np.linalg.norm(result.fun) < REACHED else None
+
+
+def _bounds(leg: Leg) -> tuple[Array, Array]:
+    """Least and greatest angles (3,) of a computed stance."""
+    limits = ranges(leg)
+    low, high = np.maximum(limits[:, 0] + AT_LIMIT, -np.pi), np.minimum(limits[:, 1] - AT_LIMIT, np.pi)
+    return low, high
+
+
+def _under_hip(leg: Leg, target: Array) -> Array:
+    low, high = _bounds(leg)
+    middle, half = (low + high) / 2, (high - low) / 2
+    found: list[tuple[float, Array]] = []
+    starts = [np.linspace(lo, hi, _STARTS + 2)[1:-1] for lo, hi in zip(low[1:], high[1:], strict=True)]
+    for second, third in product(*starts):
+        start = np.array([np.clip(0.0, low[0], high[0]), second, third])
+        q = _solved(leg, start, target)
+        if q is not None:
+            _, frames = place(leg, q)
+            # Of equally central angles, those with the knee toward the middle of the body.
+            inward = np.sign(target[0]) * (frames[2][1][0] - target[0])
+            found.append((float((((q - middle) / half) ** 2).sum()) + 1e-3 * float(inward), q))
+    if not found:
+        raise InputError(
+            f'leg "{leg.foot_body}": no joint angles within the limits put the foot under its hip, at {np.round(target, 3).tolist()} m from the base\'s '
+            "origin; give the joint angles of a stance: --stance"
+        )
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def given(skeleton: Skeleton, values: list[float]) -> list[Array]:
+    """Stances from the user's numbers: three for all legs, or three for each."""
+    count = 3 * len(skeleton.legs)
+    if len(values) not in (3, count):
+        raise InputError(
+            f"--stance: {len(values)} angles; allowed: 3, for every leg, or {count}, leg by leg ({_order(skeleton.legs)}), rad"
+        )
+    rows = np.resize(np.array(values, float), (len(skeleton.legs), 3))
+    return list(rows)
+
+
+def of_key(skeleton: Skeleton) -> list[Array] | None:
+    """The stance of the file's keyframe, if it has one."""
+    if not skeleton.key:
+        return None
+    return [np.array([skeleton.key.get(link.joint, 0.0) for link in leg.links]) for leg in skeleton.legs]
+
+
+def _order(legs: list[Leg]) -> str:
+    return ", ".join(link.joint for leg in legs for link in leg.links)
+
+
+def judge(skeleton: Skeleton, stance: list[Array], source: str) -> None:
+    """Refuse a stance that is out of its limits, or whose feet are above the base."""
+    for leg, q in zip(skeleton.legs, stance, strict=True):
+        for link, angle, (low, high) in zip(leg.links, q, ranges(leg), strict=True):
+            if not low - 1e-6 <= angle <= high + 1e-6:
+                raise InputError(
+                    f'{skeleton.path}: joint "{link.joint}": the stance ({source}) has it at {angle:.3g} rad; allowed: its range, {low:.4g} to {high:.4g}'
+                )
+        foot, _ = place(leg, q)
+        if foot[2] - leg.radius >= -leg.radius:
+            raise InputError(
+                f'{skeleton.path}: foot "{leg.foot_body}": in the stance ({source}) it is not below the base; give another with --stance'
+            )
