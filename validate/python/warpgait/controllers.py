@@ -52,9 +52,7 @@ def friction_cones(normal: Array, friction: float) -> Array:
 class Gains:
     """Feedback gains (stiffness 1/s², damping 1/s) and task weights.
 
-    The center of mass has priority over the trunk's orientation, whose gains are low. On two feet, only a rotation of the trunk can balance
-    the angular momentum of the swinging legs, which the plan does not model. With a stiff trunk, the center of mass would fall over the line
-    of support.
+    The gains are those of accelerations, so that forces and torques follow the robot's inertia.
     """
 
     com: tuple[float, float] = (100.0, 20.0)
