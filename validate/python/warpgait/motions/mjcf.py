@@ -37,6 +37,9 @@ def _write(motion: Motion, target: Path) -> None:
     custom = root.find("custom")
     if custom is None:
         custom = ElementTree.SubElement(root, "custom")
+    for text in custom.findall("text"):  # MuJoCo writes them as CDATA, which ElementTree does not keep
+        text.attrib.setdefault("data", text.text or " ")
+        text.text = None
     ElementTree.SubElement(custom, "text", {"name": "warpgait", "data": FORMAT.facts_json(motion)})
     write_bytes(target, ElementTree.tostring(root, encoding="utf-8") + b"\n")
 
