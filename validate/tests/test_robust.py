@@ -80,6 +80,8 @@ def test_the_worlds_are_scaled_by_the_robot() -> None:
         models[0].body_mass.sum() / models[1].body_mass.sum()
     )
     assert shifts[0] / shifts[1] == pytest.approx(size_of(models[0]) / size_of(models[1]))
+    inertia, friction = worlds(models[1], 0.75)[-1].disturbance.drives
+    assert inertia == pytest.approx(0.0076, rel=0.03) and friction == pytest.approx(0.4, rel=0.03)
     assert len({w.name for w in worlds(models[0], 0.75)}) == 12
 
 

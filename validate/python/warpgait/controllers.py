@@ -73,7 +73,10 @@ class Gains:
 
 
 def gains_for(size: float) -> Gains:
-    """Gains for a robot of a size in ANYmals: lengths are proportional to it, forces to its cube, as weights are."""
+    """Gains for a robot of a size in ANYmals: lengths are proportional to it, forces to its cube, as weights are.
+
+    The weight of forces compares them with accelerations, so it is that of forces by the robot's mass.
+    """
     g = Gains()
     return replace(
         g,
@@ -81,6 +84,7 @@ def gains_for(size: float) -> Gains:
         seek=(size * g.seek[0], size * g.seek[1]),
         touch_force=size**3 * g.touch_force,
         step_over=(size * g.step_over[0], size * g.step_over[1]),
+        weight_force=g.weight_force / size**6,
         least_normal_force=size**3 * g.least_normal_force,
     )
 

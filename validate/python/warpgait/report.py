@@ -79,7 +79,7 @@ def as_dict(v: Validation) -> dict[str, Any]:
             "body_factor": d.body_factor,
             "com_shift": list(d.com_shift),
             "payload": None if d.payload is None else list(d.payload),
-            "drives": d.drives,
+            "drives": list(d.drives),
             "terrain_shift": list(d.terrain_shift),
             "terrain_tilt": list(d.terrain_tilt),
             "push": None if d.push is None else list(d.push),

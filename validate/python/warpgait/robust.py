@@ -33,6 +33,9 @@ PAYLOAD = 0.04  # of the robot's mass
 PAYLOAD_PLACE = 0.22  # of the robot's size, forward and to the side of the base's origin
 DELAY = 0.004  # s, beside the control step that the controller expects: 8 ms in all, at 250 Hz
 NOISE_SEED = 1
+# Of the drives, seen from the joint. The rotors have half the inertia of an ANYmal's shank, about its knee.
+ROTOR_INERTIA = 7e-4  # of mass times size²
+DRIVE_FRICTION = 1.7e-3  # of weight times size
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ def worlds(model: Any, friction: float) -> list[World]:
     size, mass = size_of(model), float(model.body_mass.sum())
     off, place, load = CENTER_SHIFT * size, PAYLOAD_PLACE * size, PAYLOAD * mass
     shift = f"{1e3 * off:.2g} mm"
+    weight = mass * float(np.linalg.norm(model.opt.gravity))
+    drives = ROTOR_INERTIA * mass * size**2, DRIVE_FRICTION * weight * size
     heavy, light = 1 + MASS_ERROR, 1 - MASS_ERROR
     return [
         World(f"center of mass {shift} forward", Disturbance(com_shift=(off, 0.0, 0.0))),
@@ -98,7 +103,7 @@ def worlds(model: Any, friction: float) -> list[World]:
         World(f"{load:.2g} kg at the rear right", Disturbance(payload=(load, -place, -place, 0.0))),
         World(f"{1e3 * DELAY:g} ms more delay", Disturbance(delay=DELAY)),
         World("sensor noise", Disturbance(noise=1.0, seed=NOISE_SEED)),
-        World("inertia and friction of the drives", Disturbance(drives=1.0)),
+        World("inertia and friction of the drives", Disturbance(drives=drives)),
     ]
 
 

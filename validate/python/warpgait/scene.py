@@ -20,9 +20,6 @@ BASE_THICKNESS = 0.5  # m of ground below the lowest point, which MuJoCo asks fo
 LEAST_RISE = 1e-3  # m between lowest and highest point, so that a level terrain is not normalized to 0/0
 TORSIONAL_FRICTION, ROLLING_FRICTION = 0.02, 0.01  # m, of a foot, as MuJoCo defines them
 PAYLOAD, PAYLOAD_RADIUS = "payload", 0.1  # the body, and its radius of gyration, m
-# Drives at `Disturbance.drives` = 1. A motor of twice the torque has about twice the rotor inertia, seen from the joint.
-ROTOR_INERTIA = 1e-4  # kg m² for each N m of the torque limit
-DRIVE_FRICTION = 0.005  # of the torque limit
 # Of friction, relative to the normal force. MuJoCo's friction is soft: at 10, feet on a wall creep by 6 mm/s without reaching the cone.
 FRICTION_STIFFNESS = 100.0
 GROUND_COLOR = [0.55, 0.5, 0.42, 1.0]
@@ -110,11 +107,12 @@ def _change_robot(spec: Any, disturbance: Disturbance) -> None:
         base.add_body(
             name=PAYLOAD, pos=place, ipos=[0, 0, 0], mass=mass, inertia=[mass * PAYLOAD_RADIUS**2] * 3, explicitinertial=True
         )
-    limits = {motor.target: motor.ctrlrange[1] for motor in spec.actuators}
+    inertia, friction = disturbance.drives
+    driven = {motor.target for motor in spec.actuators}
     for joint in spec.joints:
-        if joint.name in limits:
-            joint.armature += disturbance.drives * ROTOR_INERTIA * limits[joint.name]
-            joint.frictionloss += disturbance.drives * DRIVE_FRICTION * limits[joint.name]
+        if joint.name in driven:
+            joint.armature += inertia
+            joint.frictionloss += friction
 
 
 def world_spec(

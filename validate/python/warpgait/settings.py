@@ -44,7 +44,7 @@ class Disturbance:
     body_factor: float = 1.0  # on the masses and inertias of all bodies
     com_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, of the robot's center of mass in the base's frame
     payload: tuple[float, float, float, float] | None = None  # kg, and where from the base's origin in its frame, m
-    drives: float = 0.0  # multiplies the rotor inertia and the friction of the drives in scene.py
+    drives: tuple[float, float] = (0.0, 0.0)  # rotor inertia kg m² and friction N m that every joint has in addition
     terrain_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m
     terrain_tilt: tuple[float, float] = (0.0, 0.0)  # degrees, about x and y, around the robot's start
     push: tuple[float, float, float, float, float] | None = None  # start s, duration s, force on the base x, y, z N
@@ -63,8 +63,8 @@ class Disturbance:
             raise _refuse("body_factor", self.body_factor, "in [0.1, 10]")
         if self.payload is not None and self.payload[0] < 0:
             raise InputError(f"--payload: the mass, {self.payload[0]:g} kg, must be zero or more")
-        if not 0 <= self.drives <= 100:
-            raise _refuse("drives", self.drives, "in [0, 100]")
+        if min(self.drives) < 0:
+            raise InputError("--drives: inertia and friction must be zero or more")
         if max(map(abs, self.terrain_tilt)) > 45:
             raise InputError("--terrain-tilt: angles must be in [-45, 45] degrees")
         if not 0 <= self.noise <= 100:

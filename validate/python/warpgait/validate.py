@@ -98,10 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     world.add_argument(
         "--drives",
-        type=float,
+        action=_numbers(2, "INERTIA,FRICTION in kg m² and N m"),
         default=disturbance.drives,
-        metavar="LEVEL",
-        help="rotor inertia and friction of the drives; at level 1, 1e-4 kg m² for each N m of the torque limit, and 0.5 %% of it (default %(default)g)",
+        metavar="INERTIA,FRICTION",
+        help="rotor inertia (kg m²) and friction (N m) that every joint has in addition",
     )
     world.add_argument(
         "--push",
