@@ -225,11 +225,28 @@ def _shape_at(shape: Shape, link: Link, frame: tuple[Array, Array]) -> Shape:
     return replace(shape, center=at + R @ (shape.center - link.anchor), rotation=R @ shape.rotation)
 
 
+def _cut(shape: Shape, leg: Leg) -> Shape | None:
+    """A box that took the place of a mesh, without the part of it beside and below the foot, which the foot's sphere stands for."""
+    upright = shape.kind == "box" and np.abs(shape.rotation - np.eye(3)).max() < 1e-6
+    if not upright or leg.foot[2] >= leg.links[-1].anchor[2]:
+        return shape
+    low, high = shape.center[2] - shape.size[2], shape.center[2] + shape.size[2]
+    end = leg.foot[2] + leg.radius
+    if low >= end:
+        return shape
+    if high <= end:
+        return None
+    center, size = shape.center.copy(), shape.size.copy()
+    center[2], size[2] = (high + end) / 2, (high - end) / 2
+    return replace(shape, center=center, size=size)
+
+
 def _trim(skeleton: Skeleton, leg: Leg, q: Array) -> Leg:
     """Leave out shapes of the shank that would touch the ground with the foot."""
     foot, frames = stances.place(leg, q)
     last, floor = leg.links[-1], foot[2] - leg.radius
-    kept = [s for s in last.shapes if _shape_at(s, last, frames[-1]).lowest() > floor + TRIM * leg.radius]
+    shapes = [_cut(s, leg) for s in last.shapes]
+    kept = [s for s in shapes if s is not None and _shape_at(s, last, frames[-1]).lowest() > floor + TRIM * leg.radius]
     if len(kept) < len(last.shapes):
         skeleton.notes.append(
             f'link "{last.body}": {len(last.shapes) - len(kept)} of its shapes reach as low as the foot and are left out'
