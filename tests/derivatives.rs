@@ -27,10 +27,12 @@ fn problem(terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
     problem_of("anymal_towr", terrain, formulation, extra)
 }
 
+/// `robot`: a name, or a robot file.
 fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
+    let key = if robot.ends_with(".toml") { "file" } else { "name" };
     let text = format!(
         "schema = 1\nformulation = \"{formulation}\"\nhorizon = 2.5\n\
-         [robot]\nname = \"{robot}\"\nadhesive_feet = [\"RF\"]\n\
+         [robot]\n{key} = \"{robot}\"\nadhesive_feet = [\"RF\"]\n\
          [terrain]\n{terrain}\nspacing = 0.05\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
          [start]\nposition = [0.3, 0.2]\n[goal]\nposition = [0.6, 0.1]\nyaw = 0.2\n\
          [map]\nmethod = \"shear\"\ncells = [24, 24, 12]\n{extra}"
@@ -214,6 +216,27 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
                 check(problem, &format!("{robot}, {terrain}, {formulation}"));
             }
         }
+    }
+}
+
+/// The same for legs without a closed form: the abduction is not about x, and all three joints have rows of speed.
+#[test]
+fn blocks_of_legs_with_other_axes_match_differences() {
+    let anymal = include_str!("../robots/anymal_c.toml");
+    let turned =
+        anymal.replace("axis = [1.000000, 0.000000, 0.000000]", "axis = [0.999800, 0.020000, 0.000000]");
+    assert_ne!(turned, anymal);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("turned.toml");
+    std::fs::write(&file, turned).unwrap();
+    let rows = |problem: &GaitProblem, name: &str| -> usize {
+        problem.blocks().filter(|(block, _)| block.name() == name).map(|(block, _)| block.rows()).sum()
+    };
+    for formulation in ["warped", "direct", "hybrid"] {
+        let problem = problem_of(file.to_str().unwrap(), TERRAINS[1].1, formulation, "");
+        let closed = problem_of("anymal_c", TERRAINS[1].1, formulation, "");
+        assert_eq!(2 * rows(&problem, "joint speed"), 3 * rows(&closed, "joint speed"));
+        check(problem, &format!("turned axes, {formulation}"));
     }
 }
 
