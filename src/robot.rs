@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::sha256_hex;
 use crate::input::{self, Document};
+use crate::leg::body::Body;
 use crate::leg::{Leg, LegSpec};
 use crate::{Error, Result};
 
@@ -151,6 +152,17 @@ impl Robot {
         self.feet.iter().map(|foot| foot.name.as_str()).collect()
     }
 
+    /// Trunk and links, where the file has the joints of every leg. (A robot that cannot have such links is not loaded.)
+    pub fn body(&self) -> Option<Body> {
+        self.build_body()?.ok()
+    }
+
+    fn build_body(&self) -> Option<std::result::Result<Body, String>> {
+        let legs: Vec<Option<Leg>> = self.feet.iter().map(Foot::leg).collect();
+        let nominal: Vec<Vector3<f64>> = self.feet.iter().map(|foot| foot.nominal.into()).collect();
+        Body::new(self.mass, Matrix3::from_fn(|i, j| self.inertia[i][j]), &legs, &nominal)
+    }
+
     /// Height of the center of mass above the feet at rest, m.
     pub fn standing_height(&self) -> f64 {
         -self.feet.iter().map(|foot| foot.nominal[2]).sum::<f64>() / self.feet.len() as f64
@@ -231,6 +243,9 @@ impl Robot {
                     document.error(&format!("{key}.leg{dot}{}", e.key), e.what)
                 })?;
             }
+        }
+        if let Some(Err(what)) = robot.build_body() {
+            return Err(document.error("mass", what));
         }
         Ok(robot)
     }

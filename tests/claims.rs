@@ -146,6 +146,7 @@ fn every_member_is_covered_by_a_law() {
         ripples("direct", "[gait]\noptimize_durations = true\n"),
         rubble(folder.path(), "direct", false, ""),
         rubble(folder.path(), "hybrid", false, ""),
+        ripples("hybrid", "").replace("anymal_towr", "anymal_c"),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();
@@ -194,7 +195,13 @@ fn numbers_in(value: &Value, at: &str, found: &mut Vec<String>) {
 
 #[test]
 fn what_meta_states_is_what_the_scenario_asks_for() {
-    let (_, plan) = solved(&ripples("direct", ""));
+    for robot in ["anymal_towr", "anymal_c"] {
+        meta_states_what_the_scenario_asks_for(robot);
+    }
+}
+
+fn meta_states_what_the_scenario_asks_for(robot: &str) {
+    let (_, plan) = solved(&ripples("direct", "").replace("anymal_towr", robot));
     let meta = serde_json::to_value(&plan.meta).unwrap();
     let mut keys = Vec::new();
     for part in ["robot", "limits", "sample_rate_hz", "schema"] {
@@ -222,7 +229,7 @@ fn what_meta_states_is_what_the_scenario_asks_for() {
         }
     }
     assert!(objects(&|meta| meta["solver"]["success"] = false.into()));
-    assert!(objects(&|meta| meta["robot"]["name"] = "anymal_c".into()));
+    assert!(objects(&|meta| meta["robot"]["name"] = "anymal_b".into()));
     assert!(objects(&|meta| meta["formulation"] = "warped".into()));
 }
 

@@ -4,7 +4,7 @@
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use warpgait::ipopt::NlpProblem;
-use warpgait::nlp::Constraint;
+use warpgait::nlp::{Constraint, LegTerms};
 use warpgait::planner::{GaitProblem, Steps, Task, derivatives};
 use warpgait::robot::Robot;
 use warpgait::scenario::{Formulation, Scenario};
@@ -21,6 +21,12 @@ const TERRAINS: [(&str, &str); 5] = [
     ("pit", "kind = \"pit\""),
     ("formula", "kind = \"formula\"\nexpression = \"0.1*sin(2*x)*cos(1.5*y) + 0.05*x*y\""),
 ];
+
+/// For robots whose legs are known: on the hill of medium height, the guess lifts a foot beside its hip, where angles have no derivatives.
+fn terrains_for_legs() -> [(&'static str, &'static str); 5] {
+    TERRAINS
+        .map(|(name, text)| (name, if name == "hilly" { "kind = \"hilly\"\nlevel = \"easy\"" } else { text }))
+}
 
 /// A short motion over a terrain, with everything that can be switched on.
 fn problem(terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
@@ -118,7 +124,7 @@ fn durations_match_differences_wherever_the_switches_are() {
     // With known legs: their speeds and torques follow the switches too.
     for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
-            for (name, terrain) in TERRAINS {
+            for (name, terrain) in terrains_for_legs() {
                 check(
                     problem_of(robot, terrain, formulation, gait),
                     &format!("{robot}, {name}, {formulation}"),
@@ -167,9 +173,14 @@ fn hybrid_blocks_match_differences_on_all_terrains() {
 fn blocks_over_edges_match_differences() {
     let steps = "kind = \"formula\"\nexpression = \"0.04*floor(4*x + y) + 0.02*x\"";
     for formulation in ["warped", "direct", "hybrid"] {
-        for robot in ["anymal_towr", "anymal_b", "anymal_c"] {
-            let extra = "[contact]\nfootholds = \"patches\"";
-            let problem = problem_of(robot, steps, formulation, extra);
+        for (robot, legs) in [
+            ("anymal_towr", "massless"),
+            ("anymal_b", "massless"),
+            ("anymal_c", "massless"),
+            ("anymal_c", "massive"),
+        ] {
+            let extra = format!("[physics]\nlegs = \"{legs}\"\n[contact]\nfootholds = \"patches\"");
+            let problem = problem_of(robot, steps, formulation, &extra);
             let rows = |name: &str| {
                 let found = problem.blocks().find(|(block, _)| block.name() == name);
                 found.map_or(0, |(block, _)| block.rows())
@@ -207,8 +218,9 @@ fn coarse_knots_and_newton_euler_match_differences() {
 fn blocks_of_known_legs_match_differences_on_all_terrains() {
     for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
-            for (terrain, text) in TERRAINS {
+            for (terrain, text) in terrains_for_legs() {
                 let problem = problem_of(robot, text, formulation, "");
+                has_leg_terms(&problem);
                 for name in ["joint speed", "joint torque", "knee clearance"] {
                     let has = |(block, _): (&dyn Constraint, usize)| block.name() == name && block.rows() > 0;
                     assert!(problem.blocks().any(has), "{name}");
@@ -238,6 +250,33 @@ fn blocks_of_legs_with_other_axes_match_differences() {
         assert_eq!(2 * rows(&problem, "joint speed"), 3 * rows(&closed, "joint speed"));
         check(problem, &format!("turned axes, {formulation}"));
     }
+}
+
+/// What the legs' mass adds is not zero.
+fn has_leg_terms(problem: &GaitProblem) {
+    let terms = &problem.model.leg_terms;
+    let largest = |values: &[nalgebra::Vector3<f64>]| values.iter().map(|v| v.norm()).fold(0.0, f64::max);
+    assert!(largest(&terms.shift) > 1e-4 && largest(&terms.shift_between) > 1e-4);
+    assert!(largest(&terms.torque) > 1e-4 && terms.inertia.iter().any(|term| term.form.norm() > 1e-3));
+    assert!(terms.joint_torque.iter().flatten().flatten().any(|torque| torque.abs() > 1.0));
+}
+
+#[test]
+fn other_laws_of_legs_with_mass_match_differences() {
+    for (formulation, law) in [
+        ("warped", "pcdm-backward"),
+        ("hybrid", "pcdm-backward"),
+        ("hybrid", "newton-euler"),
+        ("direct", "newton-euler"),
+    ] {
+        let extra = format!("[physics]\nlaw = \"{law}\"\nlegs = \"massive\"");
+        let problem = problem_of("anymal_c", TERRAINS[4].1, formulation, &extra);
+        has_leg_terms(&problem);
+        check(problem, &format!("{law}, {formulation}"));
+    }
+    let massless = problem_of("anymal_c", TERRAINS[4].1, "hybrid", "[physics]\nlegs = \"massless\"");
+    assert_eq!(massless.model.leg_terms, LegTerms::default());
+    check(massless, "massless");
 }
 
 /// Two threads add what one adds, up to the order of sums, and the same bits each time.

@@ -100,7 +100,13 @@ fn splines_that_do_not_fit_together_are_refused() {
     type Spoil = fn(&mut Plan);
     let cases: [(Spoil, &str); 12] = [
         (|plan| plan.splines.retain(|(name, ..)| name != "LF_footholds"), "spline/LF_footholds: is missing"),
-        (|plan| splines(plan, "base_control_points").1 = vec![86, 3], "expected (knot intervals + 3, 6)"),
+        (
+            |plan| {
+                let shape = &mut splines(plan, "base_control_points").1;
+                *shape = vec![2 * shape[0], 3];
+            },
+            "expected (knot intervals + 3, 6)",
+        ),
         (|plan| splines(plan, "base_control_points").2[1] += 0.1, "start and end at rest"),
         (|plan| splines(plan, "base_knots").2[7] += 0.01, "not uniform"),
         (|plan| splines(plan, "base_knots").2.fill(f64::NAN), "not uniform"),

@@ -41,6 +41,13 @@ pub(super) fn asked_robot(plan: &Plan, scenario: &Scenario) -> Result<MetaRobot>
         reach: robot.feet.iter().map(|foot| foot.reach).collect(),
         torso: robot.torso,
         foot_radius: robot.foot_radius(),
+        // Plans of version 0.1.0 and before know massless legs only.
+        legs: if stated.nominal.is_empty() && plan.legs.is_none() {
+            Vec::new()
+        } else {
+            MetaRobot::legs_of(&robot, scenario)
+        },
+        nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
     })
 }
 
@@ -75,10 +82,11 @@ fn magnitude(plan: &Plan) -> f64 {
         &plan.foot_force,
         &plan.foot_normal,
     ];
+    let legs = plan.legs.iter().flat_map(|legs| [&legs.shift, &legs.angular_momentum]);
     let warped = plan.warped.iter().flat_map(|w| [&w.foot_position, &w.foot_force]);
     let warped_base = plan.warped.iter().flat_map(|w| &w.base).flat_map(|b| [&b.position, &b.euler]);
     let map = plan.map.iter().map(|map| &map.control_points);
-    let points = base.into_iter().chain(feet).chain(warped).chain(warped_base).chain(map);
+    let points = base.into_iter().chain(feet).chain(legs).chain(warped).chain(warped_base).chain(map);
     let numbers = plan.phase_durations.iter().chain(plan.splines.iter().map(|(.., values)| values));
     let ground = [Some(&plan.ground.height), plan.ground.raw.as_ref()];
     points
@@ -129,6 +137,21 @@ fn robot(s: &Subject, remarks: &mut Vec<String>) {
     }
     for (e, (a, b)) in stated.reach.iter().zip(&asked.reach).enumerate() {
         compare(remarks, &format!("meta.robot.reach[{e}]"), &numbers(a), &numbers(b));
+    }
+    if stated.legs != asked.legs {
+        let stated = if stated.legs.is_empty() { "is missing" } else { "has other links" };
+        remarks.push(format!(
+            "meta.robot.legs {stated}; by those that the scenario asks for the plan is judged"
+        ));
+    }
+    if !stated.nominal.is_empty() {
+        compare(remarks, "meta.robot.nominal", &stated.nominal.concat(), &asked.nominal.concat());
+    }
+    if s.plan.legs.is_some() != s.body.is_some() {
+        let verb = if s.plan.legs.is_some() { "has" } else { "lacks" };
+        remarks.push(format!(
+            "a plan that {verb} center_of_mass_shift, for legs of which the scenario asks the opposite"
+        ));
     }
     // Plans of version 0.1.0 and before state no radius.
     if s.plan.meta.limits.is_some() {

@@ -17,9 +17,10 @@
 //! which again is exact where the acceleration is linear; the same holds before touch-down, backward in time.
 
 use super::laws;
-use super::splines::SWING_KNOTS;
+use super::splines::swing_knots;
 use super::subject::{Finding, Subject, Worst, larger, rms};
 use super::vector::{add, dot, norm, rotation_between, scale, sub};
+use crate::Result;
 
 /// Knots of a swing this near to a sample, s, are at it.
 const AT_SAMPLE: f64 = 1e-9;
@@ -28,11 +29,12 @@ const TIME: f64 = 0.1;
 /// Lever arm by which rotations are compared with motions, m.
 const LEVER: f64 = 0.3;
 
-pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
+pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     base(s, findings);
-    feet(s, findings);
+    feet(s, findings)?;
     quaternions(s, findings);
     rest(s, findings);
+    Ok(())
 }
 
 /// Position (or the rotation so far), velocity and acceleration at two successive samples.
@@ -96,12 +98,13 @@ fn base(s: &Subject, findings: &mut Vec<Finding>) {
     findings.push((laws::ANGULAR_CONSISTENCY_MAX, angular_worst));
 }
 
-fn feet(s: &Subject, findings: &mut Vec<Finding>) {
+fn feet(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     let (plan, h) = (s.plan, s.step);
+    let free = plan.swing_shape()?.free();
     let [mut velocity, mut acceleration, mut standing] = [Worst::default(); 3];
     for e in 0..s.feet {
         let at = |values: &[[f64; 3]], n: usize| values[n * s.feet + e];
-        let knots = swing_knots(&plan.phase_durations[e]);
+        let knots = knots_of(&plan.phase_durations[e], free);
         for n in 0..s.samples {
             if s.in_contact(n, e) {
                 let [v, a] = [&plan.foot_velocity, &plan.foot_acceleration].map(|values| norm(at(values, n)));
@@ -139,15 +142,17 @@ fn feet(s: &Subject, findings: &mut Vec<Finding>) {
     findings.push((laws::FOOT_VELOCITY, velocity));
     findings.push((laws::FOOT_ACCELERATION, acceleration));
     findings.push((laws::STANCE_MOTION, standing));
+    Ok(())
 }
 
 /// Times, s, at which a foot's acceleration may jump or have a kink: the knots of its swings.
-fn swing_knots(durations: &[f64]) -> Vec<f64> {
+fn knots_of(durations: &[f64], free: usize) -> Vec<f64> {
+    let (all, _) = swing_knots(free);
     let mut knots = Vec::new();
     let mut start = 0.0;
     for (i, duration) in durations.iter().enumerate() {
         if i % 2 == 1 {
-            knots.extend(SWING_KNOTS[3..8].iter().map(|u| start + u * duration));
+            knots.extend(all[3..all.len() - 3].iter().map(|u| start + u * duration));
         }
         start += duration;
     }

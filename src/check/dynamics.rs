@@ -20,6 +20,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     report(findings, laws::NEWTON_RMS, laws::NEWTON_MAX, &residuals.newton);
     residuals.euler = euler(s, &torques);
     report(findings, laws::EULER_RMS, laws::EULER_MAX, &residuals.euler);
+    legs(s, findings);
 }
 
 fn report(
@@ -70,9 +71,22 @@ fn newton(s: &Subject, forces: &[[f64; 3]]) -> Vec<f64> {
         .collect()
 }
 
-/// ‖L̇ − Σ(pᵢ − p) × fᵢ‖ by sample, % of m g · 0.3 m, with L = R I Rᵀ ω.
+/// ‖L̇ − Σ(pᵢ − p) × fᵢ‖ by sample, % of m g · 0.3 m, with L = R I Rᵀ ω, or that of trunk and legs where these have mass.
 fn euler(s: &Subject, torques: &[[f64; 3]]) -> Vec<f64> {
     let plan = s.plan;
+    let differenced = |momenta: &[[f64; 3]], n: usize| {
+        if n == 0 || n + 1 == s.samples {
+            return 0.0;
+        }
+        norm(sub(scale(1.0 / s.step, sub(momenta[n], momenta[n - 1])), hat(torques, n)))
+    };
+    let percent = 100.0 / (s.weight * LEVER);
+    if let Some(body) = &s.body {
+        // The robot stands still at both ends, where only the torques have to vanish.
+        let at_rest = |n: usize| if n == 0 || n + 1 == s.samples { norm(torques[n]) } else { 0.0 };
+        let all = (0..s.samples).map(|n| percent * larger(differenced(&body.momentum, n), at_rest(n)));
+        return all.collect();
+    }
     // From orientations alone: the mean angular velocity between two samples, and the inertia halfway.
     let momenta: Vec<[f64; 3]> = plan
         .base_quaternion_wxyz
@@ -91,14 +105,28 @@ fn euler(s: &Subject, torques: &[[f64; 3]]) -> Vec<f64> {
                 cross(omega, inertia_times(s, q, omega)),
             );
             let stated = norm(sub(change, torques[n]));
-            let differenced = if n == 0 || n + 1 == s.samples {
-                0.0
-            } else {
-                norm(sub(scale(1.0 / s.step, sub(momenta[n], momenta[n - 1])), hat(torques, n)))
-            };
-            100.0 * larger(stated, differenced) / (s.weight * LEVER)
+            percent * larger(stated, differenced(&momenta, n))
         })
         .collect()
+}
+
+/// What the plan states of its legs' mass against the postures.
+fn legs(s: &Subject, findings: &mut Vec<Finding>) {
+    let (Some(body), Some(stated)) = (&s.body, &s.plan.legs) else { return };
+    let (mut shift, mut momentum) = (Worst::default(), Worst::default());
+    for n in 0..s.samples {
+        shift.meet(1e3 * norm(sub(stated.shift[n], body.shift[n])), n, None);
+        // At both ends the robot is at rest.
+        let halves = [n.checked_sub(1), Some(n)].map(|n| n.and_then(|n| body.momentum.get(n).copied()));
+        let expected = match halves {
+            [Some(a), Some(b)] => scale(0.5, add(a, b)),
+            _ => [0.0; 3],
+        };
+        let off = norm(sub(stated.angular_momentum[n], expected));
+        momentum.meet(100.0 * off / (s.weight * LEVER), n, None);
+    }
+    findings.push((laws::SHIFT, shift));
+    findings.push((laws::MOMENTUM, momentum));
 }
 
 /// R I Rᵀ v.

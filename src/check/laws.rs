@@ -52,8 +52,12 @@ laws! {
     MAP_TURN = "map_turn", "mrad", Some(1e-2), None, "the same for the base's orientation";
     NEWTON_RMS = "newton_rms", "% m g", Some(0.5), None, "Newton's law, m p̈ = Σf + m g, root mean square";
     NEWTON_MAX = "newton_max", "% m g", Some(3.0), None, "Newton's law, worst sample";
-    EULER_RMS = "euler_rms", "% m g·0.3 m", Some(0.5), None, "Euler's law about the center of mass, root mean square";
+    EULER_RMS = "euler_rms", "% m g·0.3 m", Some(0.5), None, "Euler's law about the center of mass, for the whole robot if its legs have mass; root mean square";
     EULER_MAX = "euler_max", "% m g·0.3 m", Some(3.0), None, "Euler's law, worst sample";
+    SHIFT = "center_of_mass_shift", "mm", Some(0.5), None,
+        "difference of the shift of the center of mass from that of the postures, by inverse kinematics";
+    MOMENTUM = "angular_momentum", "% m g·0.3 m·s", Some(0.1), None,
+        "difference of the angular momentum from that of trunk and legs, by inverse kinematics";
     LINEAR_CONSISTENCY = "linear_consistency", "% g", Some(0.1), None,
         "base velocity and acceleration are the derivatives of the position, root mean square";
     LINEAR_CONSISTENCY_MAX = "linear_consistency_max", "% g", Some(1.0), None, "the same, worst sample";

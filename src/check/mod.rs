@@ -10,6 +10,7 @@ mod derivatives;
 mod dynamics;
 mod ground;
 mod laws;
+mod legs;
 mod measured;
 mod motion;
 mod patches;
@@ -59,7 +60,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     claims::findings(&subject, &mut findings, &mut remarks);
     splines::findings(&subject, &mut findings)?;
     terrain::findings(&subject, &mut findings)?;
-    derivatives::findings(&subject, &mut findings);
+    derivatives::findings(&subject, &mut findings)?;
     dynamics::findings(&subject, &mut findings, &mut residuals);
     contact::findings(&subject, &mut findings, &mut residuals);
     patches::findings(&subject, &mut findings);

@@ -11,7 +11,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     smoothness(s, findings);
 }
 
-/// Eq. 4: distance of Rᵀ(pᵢ − p) from the box 𝓡ᵢ.
+/// Eq. 4: distance of Rᵀ(pᵢ − p) + s from the box 𝓡ᵢ.
 fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let mut worst = Worst::default();
     residuals.reach = vec![0.0; s.samples];
@@ -19,8 +19,8 @@ fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
         let relative = sub(s.foot_position(n, e), s.plan.base_position[n]);
         let body = rotate_back(s.plan.base_quaternion_wxyz[n], relative);
         let limits = &s.robot.reach[e];
-        let beyond =
-            std::array::from_fn(|k| larger((body[k] - limits.center[k]).abs() - limits.half_size[k], 0.0));
+        let center = s.on_trunk(n, limits.center);
+        let beyond = std::array::from_fn(|k| larger((body[k] - center[k]).abs() - limits.half_size[k], 0.0));
         let distance = 1e3 * norm(beyond);
         worst.meet(distance, n, Some(e));
         residuals.reach[n] = residuals.reach[n].max(distance);
@@ -40,7 +40,10 @@ fn base_clearance(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Resi
             for j in 0..3 {
                 let at = [f64::from(i) / 2.0 - 1.0, f64::from(j) - 1.0, -1.0];
                 let corner = std::array::from_fn(|k| torso.center[k] + at[k] * torso.half_size[k]);
-                let [x, y, z] = add(s.plan.base_position[n], rotate(s.plan.base_quaternion_wxyz[n], corner));
+                let [x, y, z] = add(
+                    s.plan.base_position[n],
+                    rotate(s.plan.base_quaternion_wxyz[n], s.on_trunk(n, corner)),
+                );
                 here = -larger(-here, -1e3 * (z - s.ground.height(x, y)));
             }
         }

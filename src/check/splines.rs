@@ -11,8 +11,15 @@ use crate::{Error, Result};
 
 /// Closer to a switch than this, s, a foot may count as standing or not.
 const SWITCH: f64 = 1e-7;
-/// Knots of a swing, as fractions of its duration: the foot rests at both ends, where two control points are the foothold.
-pub(super) const SWING_KNOTS: [f64; 11] = [0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0];
+
+/// Knots of a swing, as fractions of its duration, and how many control points are the foothold at each end, where the foot rests. With
+/// three free control points there are two, with five there are three.
+pub(super) fn swing_knots(free: usize) -> (Vec<f64>, usize) {
+    let ends = if free == 3 { 2 } else { 3 };
+    let intervals = free + 2 * ends - 3;
+    let at = |i: usize| i.saturating_sub(3).min(intervals) as f64 / intervals as f64;
+    ((0..intervals + 7).map(at).collect(), ends)
+}
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     // Refuses splines that do not fit together: shapes, knots and phases.
@@ -33,6 +40,8 @@ struct Splines<'a> {
     force_knots: &'a [f64],
     footholds: Vec<&'a [[f64; 3]]>,
     swings: Vec<&'a [[f64; 3]]>,
+    /// Free control points of a swing.
+    free: usize,
     forces: Vec<&'a [[f64; 3]]>,
 }
 
@@ -56,6 +65,7 @@ impl<'a> Splines<'a> {
             force_knots: member("force_knots")?,
             footholds: of_feet("footholds")?,
             swings: of_feet("swing_control_points")?,
+            free: plan.swing_shape()?.free(),
             forces: of_feet("force_nodes")?,
         })
     }
@@ -152,9 +162,10 @@ fn foot(s: &Subject, splines: &Splines, e: usize, t: f64) -> ([f64; 3], bool, bo
         let (stance, in_swing) = (i / 2, i % 2 == 1);
         if in_swing && t > start && t < end {
             let [a, b] = [footholds[stance], footholds[stance + 1]];
-            let c = &swings[3 * stance..];
-            let knots = SWING_KNOTS.map(|u| start + u * duration);
-            let place = cubic(&knots, &[a, a, c[0], c[1], c[2], b, b], t);
+            let (knots, ends) = swing_knots(splines.free);
+            let knots: Vec<f64> = knots.iter().map(|u| start + u * duration).collect();
+            let free = &swings[splines.free * stance..][..splines.free];
+            let place = cubic(&knots, &[&vec![a; ends], free, &vec![b; ends]].concat(), t);
             return (place, true, near || (t - end).abs() < SWITCH);
         }
         if !in_swing && t <= end {

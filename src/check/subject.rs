@@ -2,7 +2,8 @@
 
 use super::ground::PlanGround;
 use super::laws::CheckedLaw;
-use super::vector::norm;
+use super::legs::BodyMotion;
+use super::vector::{norm, sub};
 use crate::plan::{MetaRobot, Plan};
 use crate::scenario::Scenario;
 use crate::{Error, Result};
@@ -39,6 +40,8 @@ pub(super) struct Subject<'a> {
     /// What the plan is judged by: as the scenario asks, not as the plan states.
     pub robot: MetaRobot,
     pub ground: PlanGround,
+    /// Trunk and links along the plan, where the legs have mass.
+    pub body: Option<BodyMotion>,
     pub samples: usize,
     pub feet: usize,
     /// Time between samples, s.
@@ -80,8 +83,10 @@ impl<'a> Subject<'a> {
         if !(step > 0.0 && even) {
             return Err(Error::input("member `t`: the samples are not evenly spaced in time".to_owned()));
         }
+        let body = BodyMotion::new(plan, &robot).map_err(Error::input)?;
         Ok(Self {
             plan,
+            body,
             scenario,
             robot,
             ground: if plan.patches.is_empty() {
@@ -102,6 +107,11 @@ impl<'a> Subject<'a> {
 
     pub fn foot_force(&self, n: usize, e: usize) -> [f64; 3] {
         self.plan.foot_force[n * self.feet + e]
+    }
+
+    /// A point fixed to the trunk, base frame from the center of mass at the nominal stance, as seen from the center of mass.
+    pub fn on_trunk(&self, n: usize, point: [f64; 3]) -> [f64; 3] {
+        self.body.as_ref().map_or(point, |body| sub(point, body.shift[n]))
     }
 
     pub fn in_contact(&self, n: usize, e: usize) -> bool {

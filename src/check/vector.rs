@@ -47,3 +47,42 @@ pub(super) fn rotation_between(a: [f64; 4], b: [f64; 4]) -> [f64; 3] {
     let factor = if sine < 1e-9 { 2.0 } else { 2.0 * sine.atan2(w.abs()) / sine };
     scale(if w < 0.0 { -factor } else { factor }, v)
 }
+
+/// A 3 × 3 matrix, rows first.
+pub(super) type Turn = [[f64; 3]; 3];
+
+pub(super) fn apply(a: &Turn, v: [f64; 3]) -> [f64; 3] {
+    a.map(|row| dot(row, v))
+}
+
+pub(super) fn transposed(a: &Turn) -> Turn {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+pub(super) fn product(a: &Turn, b: &Turn) -> Turn {
+    a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
+}
+
+/// The rotation by a rotation vector.
+pub(super) fn rotation(vector: [f64; 3]) -> Turn {
+    let angle = norm(vector);
+    let axis = if angle > 0.0 { scale(1.0 / angle, vector) } else { [1.0, 0.0, 0.0] };
+    let (sin, cos) = angle.sin_cos();
+    let [x, y, z] = axis;
+    let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            let unit = if i == j { cos } else { 0.0 };
+            unit + (1.0 - cos) * axis[i] * axis[j] + sin * skew[i][j]
+        })
+    })
+}
+
+/// The rotation vector (world) that turns orientation a into b, by less than half a turn.
+pub(super) fn turn_between(a: &Turn, b: &Turn) -> [f64; 3] {
+    let r = product(b, &transposed(a));
+    let skew = scale(0.5, [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]);
+    let sine = norm(skew);
+    let cosine = 0.5 * (r[0][0] + r[1][1] + r[2][2] - 1.0);
+    if sine == 0.0 { skew } else { scale(sine.atan2(cosine) / sine, skew) }
+}

@@ -1,7 +1,7 @@
-//! The torso's underside keeps clear of the ground.
+//! The torso's underside keeps clear of the ground; s is the shift of the center of mass ([`crate::nlp::leg_terms`]).
 //!
 //! ```text
-//!   zᵀq − h(q) ≥ base_clearance,  q = p + R b, for points b of the underside
+//!   zᵀq − h(q) ≥ base_clearance,  q = p + R (b − s), for points b of the underside
 //! ```
 //!
 //! Rows: all points of the grid at every `STRIDE`-th sample, m. `check` evaluates every sample.
@@ -41,7 +41,12 @@ impl BaseClearance {
     }
 }
 
-/// R b, the ground under q, the gap and its derivative in q.
+/// A point of the underside at sample k, as seen from the center of mass, base frame, m.
+fn from_center(model: &Model, (k, b): &(usize, Vector3<f64>)) -> Vector3<f64> {
+    b - model.leg_terms.shift(*k)
+}
+
+/// R b, the ground under q, the gap and its derivative in q, for b as seen from the center of mass.
 fn point(model: &Model, base: &BaseNode, b: &Vector3<f64>) -> (Vector3<f64>, HeightJet, f64, Vector3<f64>) {
     let arm = base.rotation() * b;
     let q = base.position() + arm;
@@ -64,14 +69,15 @@ impl Constraint for BaseClearance {
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (value, (k, b)) in out.iter_mut().zip(&self.places) {
-            *value = point(model, &state.base[*k], b).2;
+        for (value, place) in out.iter_mut().zip(&self.places) {
+            *value = point(model, &state.base[place.0], &from_center(model, place)).2;
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (r, (k, b)) in self.places.iter().enumerate() {
-            let (arm, _, _, by_q) = point(model, &state.base[*k], b);
+        for (r, place) in self.places.iter().enumerate() {
+            let (k, b) = (&place.0, from_center(model, place));
+            let (arm, _, _, by_q) = point(model, &state.base[*k], &b);
             // dq = dp + δ × R b.
             let pose = PoseTangent::new(model, state, Instant::Sample(*k));
             pose.add_along(&arm.cross(&by_q), &by_q, &mut sink.row(first + r));
@@ -86,8 +92,9 @@ impl Constraint for BaseClearance {
         curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
-        for (&lambda, (k, b)) in multipliers.iter().zip(&self.places) {
-            let (arm, ground, _, by_q) = point(model, &state.base[*k], b);
+        for (&lambda, place) in multipliers.iter().zip(&self.places) {
+            let (k, b) = (&place.0, from_center(model, place));
+            let (arm, ground, _, by_q) = point(model, &state.base[*k], &b);
             curvature.base_position[*k] += by_q * lambda;
             curvature.base_rotation[*k] += by_q * b.transpose() * lambda;
             // dq = dp − [R b] δ.

@@ -3,7 +3,7 @@
 //! ```text
 //!   Σ_l w_l Σ_i f_i(t_l) + m g                    = m/Δt² Σ_j c_j p(t_j)
 //!   Σ_l w_l Σ_i (p_i(t_l) − p(t_l)) × f_i(t_l)    = −1/Δt² Σ_j c'_j ρ∫ R(t_j) x × R(t) x dv
-//!                                                 = 1/Δt² axis(N − Nᵀ),  N = Σ_j c'_j R(t_j) S R(t)ᵀ
+//!                                                 = 1/Δt² axis(N − Nᵀ) + λ(t),  N = Σ_j c'_j R(t_j) S R(t)ᵀ
 //! ```
 //!
 //! | law | c over t₋₋ t₋ t t₊ | c' | w |
@@ -16,11 +16,15 @@
 //! that is linear between samples, whose hat averages are zero and which vanishes at both ends of the motion, vanishes
 //! everywhere. At the first and the last sample the robot rests, and the row is the balance of forces there.
 //!
+//! λ is what the legs' own mass adds, averaged with the same hat: a known function of time and a term that follows the swinging feet, see
+//! [`crate::nlp::leg_terms`]; zero for massless legs.
+//!
 //! Rows: 6 a sample, force then torque about the center of mass, world frame, in m g and m g · 1 m.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::nlp::curvature::NodeCurvature;
+use crate::nlp::foot_in_base;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::Sink;
 use crate::nlp::tangent::Tangent;
@@ -127,7 +131,7 @@ impl Constraint for Dynamics {
         let acceleration = 1.0 / (model.layout.time_step.powi(2) * GRAVITY);
         for (k, stencil) in self.stencils.iter().enumerate() {
             let mut force = -Vector3::z();
-            let mut torque = Vector3::zeros();
+            let mut torque = -model.leg_terms.torque(k);
             for &(l, weight) in &stencil.wrench {
                 let p = state.base[l].position();
                 for i in 0..model.feet() {
@@ -148,6 +152,12 @@ impl Constraint for Dynamics {
             for c in 0..3 {
                 out[6 * k + c] = force[c];
                 out[6 * k + 3 + c] = torque[c];
+            }
+        }
+        for inertia in &model.leg_terms.inertia {
+            let torque = foot_in_base::inertial_torque(model, state, inertia);
+            for c in 0..3 {
+                out[6 * inertia.sample + 3 + c] -= torque[c];
             }
         }
     }
@@ -213,6 +223,15 @@ impl Constraint for Dynamics {
                 turn.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
             }
         }
+        for inertia in &model.leg_terms.inertia {
+            for (l, weight) in inertia.stencil() {
+                for c in 0..3 {
+                    let by = inertia.form.row(c).transpose() * -weight;
+                    let row = first + 6 * inertia.sample + 3 + c;
+                    foot_in_base::add_derivative(model, state, (inertia.foot, l), &by, &mut sink.row(row));
+                }
+            }
+        }
     }
 
     fn hessian(
@@ -265,6 +284,13 @@ impl Constraint for Dynamics {
                 let form = &mut curvature.forms.forces[i][l];
                 form.foothold += cross;
                 form.base -= cross;
+            }
+        }
+        for inertia in &model.leg_terms.inertia {
+            let torque = Vector3::from_column_slice(&multipliers[6 * inertia.sample + 3..][..3]);
+            for (l, weight) in inertia.stencil() {
+                let lambda = inertia.form.tr_mul(&torque) * -weight;
+                foot_in_base::add_curvature(model, state, (inertia.foot, l), &lambda, curvature);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Speed limits of the joints of a swinging leg.
 //!
 //! ```text
-//!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  r = Rᵀ(p_i − p)
+//!   −fraction ≤ (q(r(t + Δt/2)) − q(r(t))) / (Δt/2 · speed_limit) ≤ fraction,  r = Rᵀ(p_i − p) + s
 //! ```
 //!
 //! q are the angles of thigh and knee for a leg with a closed form, of which the abduction is slow and has no row, and otherwise those of

@@ -1,10 +1,11 @@
 //! Torque limits of the joints of a standing leg.
 //!
 //! ```text
-//!   −fraction ≤ (∂r/∂q)ᵀ Rᵀ f / torque_limit ≤ fraction,  r = Rᵀ(p_i − p)
+//!   −fraction ≤ ((∂r/∂q)ᵀ Rᵀ f − g) / torque_limit ≤ fraction,  r = Rᵀ(p_i − p) + s
 //! ```
 //!
-//! The torques are those of a massless leg, see [`crate::leg`]. Legs that the robot's file does not describe have no rows.
+//! g is what the joint bears for the links below it, their weight and inertia: a known function of time, zero for massless legs
+//! ([`crate::nlp::leg_terms`]). Legs that the robot's file does not describe have no rows.
 //!
 //! Rows: HAA, HFE, KFE for each free force; fraction of the limit.
 
@@ -94,8 +95,10 @@ impl Constraint for JointTorque {
         {
             let columns = columns(model, &leg, foot_in_base::value(model, state, (i, k)).into());
             let local = state.base[k].rotation().tr_mul(&state.forces[i][k]);
-            for (row, column) in rows.iter_mut().zip(columns) {
-                *row = Vector3::from(column).dot(&local);
+            let own = model.leg_terms.joint_torque(i, k);
+            for (j, (row, column)) in rows.iter_mut().zip(columns).enumerate() {
+                *row = -own[j] / leg.torque_limit[j];
+                *row += Vector3::from(column).dot(&local);
             }
         }
     }

@@ -1,10 +1,10 @@
 //! Knees and shanks keep clear of the ground. On cliffs they are the first parts to hit it.
 //!
 //! ```text
-//!   (zᵀq − h(q)) n_z ≥ radius + margin,  q = p + R v(r),  r = Rᵀ(p_i − p)
+//!   (zᵀq − h(q)) n_z ≥ radius + margin,  q = p + R v(r),  r = Rᵀ(p_i − p) + s
 //! ```
 //!
-//! v(r) is a point of the shank in the base frame by inverse kinematics, see [`crate::leg`]: the knee with its radius, and the
+//! v(r) is a point of the shank by inverse kinematics, as seen from the center of mass, see [`crate::leg`]: the knee with its radius, and the
 //! shank's outermost corner. Over ground with edges, n_z is left out, h is the surface over which a ball of the knee's or the
 //! foot's size rolls, and near edges points on the axis of the shank's tube are constrained as well: an edge can reach between knee
 //! and foot. Legs that the robot's file does not describe have no rows.
@@ -110,7 +110,8 @@ impl LegPlace {
     }
 
     /// The points v(r): knee, corner, and near edges those of the tube.
-    fn points<T: Scalar>(&self, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
+    fn points<T: Scalar>(&self, model: &Model, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
+        let shift = model.leg_terms.shift(self.at);
         let ShankShape { corner, tube, .. } = self.leg.shank;
         let shank = self.leg.shank_length();
         let posture = self.leg.posture(r);
@@ -120,7 +121,10 @@ impl LegPlace {
             [tube[0] + s * (shank - tube[0]), (1.0 - s) * tube[1]]
         });
         let on_shank = [[0.0, 0.0], corner].into_iter().chain(of_tube);
-        on_shank.map(move |point| posture.on_shank(point))
+        on_shank.map(move |point| {
+            let q = posture.on_shank(point);
+            std::array::from_fn(|c| q[c] + -shift[c])
+        })
     }
 }
 
@@ -175,7 +179,9 @@ impl LegPlace {
     fn moved(&self, model: &Model, state: &State) -> impl Iterator<Item = Moved> {
         let at = (self.foot, self.at);
         let r = foot_in_base::value(model, state, at);
-        self.points(Jet::variables(&r)).enumerate().map(move |point| Moved::new(model, state, at, point))
+        self.points(model, Jet::variables(&r))
+            .enumerate()
+            .map(move |point| Moved::new(model, state, at, point))
     }
 }
 
@@ -202,7 +208,7 @@ impl Constraint for KneeClearance {
         for (place, first) in self.numbered() {
             let base = state.base_at(place.at);
             let r = foot_in_base::value(model, state, (place.foot, place.at));
-            for (point, local) in place.points(r.into()).enumerate() {
+            for (point, local) in place.points(model, r.into()).enumerate() {
                 let q = base.position() + base.rotation() * Vector3::from(local);
                 out[first + point] = above_ground(model, &q, point).0;
             }

@@ -2,13 +2,15 @@
 //!
 //! ```text
 //!   Σ_i f_i + m g                 = m p̈
-//!   Σ_i (p_i − p) × f_i           = R (I ω̇ + ω × I ω),   ω, ω̇ in the base frame
+//!   Σ_i (p_i − p) × f_i           = R (I ω̇ + ω × I ω) + λ,   ω, ω̇ in the base frame
 //!   ω = (φ̇ − ψ̇ sin θ,  θ̇ cos φ + ψ̇ cos θ sin φ,  −θ̇ sin φ + ψ̇ cos θ cos φ)
 //! ```
 //!
 //! with ZYX Euler angles (roll φ, pitch θ, yaw ψ). It needs second derivatives of position and orientation in time. In F
 //! those of 𝒫(J) involve third derivatives of φ, which jump from cell to cell, so this law is for the direct formulation only.
 //! Forces and p̈ are both linear between samples there: if Newton's law holds at the samples, it holds everywhere.
+//!
+//! λ is what the legs' own mass adds ([`crate::nlp::leg_terms`]): a known function of time, zero for massless legs.
 //!
 //! The rate of the angular momentum depends on nine numbers; dual numbers give its derivatives.
 //!

@@ -1,7 +1,7 @@
 //! Eq. 4 and 10: every foot stays in its box 𝓡ᵢ, fixed to the base.
 //!
 //! ```text
-//!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) ≤ center + half_size
+//!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) + s(t) ≤ center + half_size
 //! ```
 //!
 //! Rows: x, y, z in the base frame for each foot and sample, m; over ground with edges also halfway between samples in which a known

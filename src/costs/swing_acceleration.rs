@@ -14,7 +14,6 @@ use crate::nlp::sink::{Differential, Gradient, Sink};
 use crate::nlp::term::Cost;
 use crate::nlp::{Model, State};
 use crate::trajectory::LinearNode;
-use crate::trajectory::spline::SWING_INTERVALS;
 
 /// Penalizes acceleration of swinging feet.
 #[derive(Clone, Debug)]
@@ -38,12 +37,13 @@ impl SwingAcceleration {
     pub fn new(model: &Model, weight: f64) -> Self {
         let layout = &model.layout;
         let mut swings = Vec::new();
+        let intervals = layout.swing_shape.intervals();
         for (foot, variables) in layout.feet.iter().enumerate() {
             for (swing, s) in variables.swings.iter().enumerate() {
-                let knots = (0..=SWING_INTERVALS).map(|knot| {
-                    let end = if knot == 0 || knot == SWING_INTERVALS { 0.5 } else { 1.0 };
-                    let node = layout.swing_node(foot, swing, knot as f64 / SWING_INTERVALS as f64, 2);
-                    (node, 2.0 * weight * end / SWING_INTERVALS as f64)
+                let knots = (0..=intervals).map(|knot| {
+                    let end = if knot == 0 || knot == intervals { 0.5 } else { 1.0 };
+                    let node = layout.swing_node(foot, swing, knot as f64 / intervals as f64, 2);
+                    (node, 2.0 * weight * end / intervals as f64)
                 });
                 swings.push(WeightedSwing { foot, swing, switches: s.switches, knots: knots.collect() });
             }

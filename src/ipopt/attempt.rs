@@ -72,7 +72,9 @@ impl Attempt<'_> {
             constraints: vec![f64::NAN; layout.num_constraints],
             objective: f64::NAN,
             x,
-            multipliers: Multipliers::zeros(layout.num_variables, layout.num_constraints),
+            multipliers: session
+                .initial_multipliers()
+                .unwrap_or_else(|| Multipliers::zeros(layout.num_variables, layout.num_constraints)),
         };
         // SAFETY: the callbacks are those for a `Session<P>`, which is borrowed by nothing else until the call returns.
         let code = unsafe { application.solve(&mut iterate, std::ptr::from_mut(session).cast()) };

@@ -18,7 +18,7 @@ use super::interrupt::INTERRUPT;
 use super::layout::{ProblemLayout, Structure};
 use super::plug::Plugged;
 use super::problem::{NlpProblem, OnIteration};
-use super::solution::{IterationRecord, Mode};
+use super::solution::{IterationRecord, Mode, Multipliers};
 
 /// Why a solve must stop.
 pub enum Stop {
@@ -73,6 +73,11 @@ impl<'a, P: NlpProblem> Session<'a, P> {
             history: Vec::new(),
             stop: None,
         }
+    }
+
+    /// Those of the problem.
+    pub fn initial_multipliers(&self) -> Option<Multipliers> {
+        self.problem.initial_multipliers()
     }
 
     /// Prepares for another run of Ipopt, from the point of the last iteration, which is returned.

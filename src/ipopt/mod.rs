@@ -44,5 +44,5 @@ pub use memory::keep_freed_memory;
 pub use option_value::OptionValue;
 pub use options::Options;
 pub use problem::{NlpProblem, OnIteration};
-pub use solution::{IterationRecord, Mode, Solution, Status};
+pub use solution::{IterationRecord, Mode, Multipliers, Solution, Status};
 pub use solve::solve;

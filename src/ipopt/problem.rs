@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::solution::IterationRecord;
+use super::solution::{IterationRecord, Multipliers};
 
 /// A nonlinear program: its size, bounds, start, and functions with derivatives.
 ///
@@ -24,6 +24,11 @@ pub trait NlpProblem {
 
     /// Where to start, (n,), finite. Ipopt pushes it inside the bounds.
     fn initial_point(&self, x: &mut [f64]);
+
+    /// Multipliers to start from, which the option `warm_start_init_point` makes use of; as many as variables and constraints.
+    fn initial_multipliers(&self) -> Option<Multipliers> {
+        None
+    }
 
     /// f(x).
     fn objective(&mut self, x: &[f64], new_x: bool) -> f64;

@@ -49,7 +49,7 @@ pub struct IterationRecord {
 
 /// Multipliers of a problem with n variables and m constraints.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Multipliers {
+pub struct Multipliers {
     /// (m,) of the constraints.
     pub constraint: Vec<f64>,
     /// (n,) of the lower bounds of the variables, ≥ 0.
@@ -60,7 +60,7 @@ pub(super) struct Multipliers {
 
 impl Multipliers {
     /// All zero.
-    pub(super) fn zeros(n: usize, m: usize) -> Self {
+    pub fn zeros(n: usize, m: usize) -> Self {
         Self { constraint: vec![0.0; m], lower: vec![0.0; n], upper: vec![0.0; n] }
     }
 }

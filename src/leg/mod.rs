@@ -1,5 +1,6 @@
 //! The kinematics of a leg, with derivatives.
 
+pub mod body;
 pub mod chain;
 pub mod jet;
 mod kinematics;

@@ -1,9 +1,10 @@
-//! A foot as the base sees it, r = Rᵀ(p_i − p) in m, at an instant, with derivatives: what reach, posture and the joints of a
-//! leg are functions of. Places are (foot, instant).
+//! A foot as the trunk sees it, r = Rᵀ(p_i − p) + s in m, at an instant, with derivatives: what reach, posture and the joints of a
+//! leg are functions of. s is the shift of the center of mass ([`super::leg_terms`]), which is known. Places are (foot, instant).
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::curvature::NodeCurvature;
+use super::leg_terms::FootInertia;
 use super::model::Model;
 use super::sink::Differential;
 use super::state::State;
@@ -11,11 +12,18 @@ use super::tangent::{PoseTangent, Tangent};
 use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
-/// r = Rᵀ(p_i − p), m.
+/// r = Rᵀ(p_i − p) + s, m.
 pub fn value(model: &Model, state: &State, (i, at): (usize, impl Into<Instant>)) -> Vector3<f64> {
     let at = at.into();
     let base = state.base_at(at);
-    base.rotation().tr_mul(&(state.foot(model, i, at).point.position - base.position()))
+    let arm = state.foot(model, i, at).point.position - base.position();
+    base.rotation().tr_mul(&arm) + model.leg_terms.shift(at)
+}
+
+/// The torque on the row of Euler's law that follows a swinging foot, A (r_k−1 − 2 r_k + r_k+1); world frame, m g · 1 m.
+pub fn inertial_torque(model: &Model, state: &State, inertia: &FootInertia) -> Vector3<f64> {
+    let bent = inertia.stencil().map(|(l, weight)| value(model, state, (inertia.foot, l)) * weight);
+    inertia.form * bent.iter().sum::<Vector3<f64>>()
 }
 
 /// Adds the derivatives of a scalar that changes by `by` · (change of r).
@@ -29,13 +37,13 @@ pub fn add_derivative(
     let at = at.into();
     let world = state.base_at(at).rotation() * by;
     let arm = arm(model, state, (i, at));
-    // d(Rᵀ r) = Rᵀ ([r] δ + dp_i − dp).
+    // dr = Rᵀ ([p_i − p] δ + dp_i − dp).
     PoseTangent::new(model, state, at).add_along(&-arm.cross(&world), &-world, scalar);
     let foot = Tangent::foot(model, state.foot(model, i, at), state.foot_node(i, at));
     foot.add_along(&world, scalar);
 }
 
-/// Accumulates the second derivatives of λ · Rᵀ(p_i − p).
+/// Accumulates the second derivatives of λ · r.
 pub fn add_curvature(
     model: &Model,
     state: &State,

@@ -11,6 +11,7 @@
 //! | file | holds |
 //! | --- | --- |
 //! | [`model`] | what stays the same during a solve |
+//! | [`leg_terms`] | part of it: what the legs' own mass adds |
 //! | [`state`] | the ambient nodes at the present x |
 //! | [`term`] | what a constraint and a cost have to provide |
 //! | [`sink`] | where they put their derivatives |
@@ -22,6 +23,7 @@ pub mod contact_force;
 pub mod curvature;
 pub mod foot_in_base;
 pub mod ground_normal;
+pub mod leg_terms;
 pub mod local_forms;
 pub mod model;
 pub mod sink;
@@ -29,6 +31,7 @@ pub mod state;
 pub mod tangent;
 pub mod term;
 
+pub use leg_terms::LegTerms;
 pub use model::Model;
 pub use state::State;
 pub use term::{Constraint, Cost};

@@ -2,11 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::leg_terms::LegTerms;
 use crate::leg::Leg;
+use crate::leg::body::Body;
 use crate::robot::{Box3, Foot, Robot};
-use crate::scenario::Scenario;
+use crate::scenario::{Legs, Scenario};
 use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::layout::KnotSpacing;
+use crate::trajectory::spline::SwingShape;
 use crate::trajectory::{Gait, Layout, Spaces};
 
 /// m/s².
@@ -36,6 +39,10 @@ pub struct Model {
     pub reach: Vec<Box3>,
     /// By foot, where the robot's file describes the leg.
     pub legs: Vec<Option<Leg>>,
+    /// Trunk and links, where the legs have mass in this plan.
+    pub body: Option<Body>,
+    /// What their mass adds.
+    pub leg_terms: LegTerms,
     /// By foot.
     pub foot_names: Vec<String>,
     /// By foot.
@@ -73,6 +80,8 @@ impl Model {
                 })
             })
             .collect();
+        let body = if scenario.legs() == Legs::Massless { None } else { robot.body() };
+        let swing_shape = if body.is_some() { SwingShape::Smooth } else { SwingShape::Light };
         Self {
             mass: robot.mass,
             size: robot.size(),
@@ -80,6 +89,8 @@ impl Model {
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),
             legs: robot.feet.iter().map(Foot::leg).collect(),
+            body,
+            leg_terms: LegTerms::default(),
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
             foot_names,
             underside,
@@ -94,6 +105,7 @@ impl Model {
                     base: scenario.discretization.base_knots,
                     force: scenario.discretization.force_knots,
                 },
+                swing_shape,
             ),
         }
     }

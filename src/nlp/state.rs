@@ -150,7 +150,7 @@ impl State {
             force_nodes: (0..feet)
                 .map(|i| (0..samples).map(|k| layout.timed_force(i, k)).collect())
                 .collect(),
-            basis: SwingBasis::new(),
+            basis: SwingBasis::new(layout.swing_shape),
         }
     }
 

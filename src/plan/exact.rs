@@ -6,6 +6,7 @@ use super::{NamedArray, Plan};
 use crate::heightfield::Heightfield;
 use crate::trajectory::layout::Layout;
 use crate::trajectory::sampling::{self, BaseMotion, FootMotion};
+use crate::trajectory::spline::SwingShape;
 use crate::trajectory::switches::snapped;
 use crate::trajectory::{Gait, Spaces, Swing};
 use crate::warp::WarpMap;
@@ -116,7 +117,8 @@ impl Plan {
         if swings.len() != self.foot_names.len() {
             return Err(Error::input("member phase_durations: needs one row for each of foot_names"));
         }
-        let layout = Layout::with_base_intervals(&Gait { intervals, swings }, time_step, base_intervals, 1);
+        let gait = Gait { intervals, swings };
+        let layout = Layout::with_base_intervals(&gait, time_step, base_intervals, 1, self.swing_shape()?);
         let mut x = vec![0.0; layout.variables];
         for (i, point) in base.as_chunks::<6>().0.iter().enumerate() {
             x[layout.base_block(i)..][..6].copy_from_slice(point);
@@ -158,9 +160,10 @@ impl Plan {
         for (stance, foothold) in variables.stances.iter().zip(footholds.as_chunks::<3>().0) {
             x[stance.foothold.first()..][..3].copy_from_slice(foothold);
         }
-        let swings = member("swing_control_points", &[variables.swings.len(), 3, 3])?;
-        for (swing, points) in variables.swings.iter().zip(swings.as_chunks::<9>().0) {
-            x[swing.control_points..][..9].copy_from_slice(points);
+        let free = layout.swing_shape.free();
+        let swings = member("swing_control_points", &[variables.swings.len(), free, 3])?;
+        for (swing, points) in variables.swings.iter().zip(swings.chunks_exact(3 * free)) {
+            x[swing.control_points..][..3 * free].copy_from_slice(points);
         }
         let forces = member("force_nodes", &[layout.intervals + 1, 3])?;
         for (k, force) in forces.as_chunks::<3>().0.iter().enumerate() {
@@ -174,6 +177,23 @@ impl Plan {
             }
         }
         Ok(())
+    }
+
+    /// How the swings are made of control points: by their number.
+    ///
+    /// # Errors
+    /// For a number that no swing has, and members that are missing.
+    pub fn swing_shape(&self) -> Result<SwingShape> {
+        let Some(foot) = self.foot_names.first() else { return Ok(SwingShape::Light) };
+        let member = format!("{foot}_swing_control_points");
+        let (shape, _) = self.spline(&member)?;
+        let found = match shape {
+            &[_, free, 3] => SwingShape::with_free(free),
+            _ => None,
+        };
+        found.ok_or_else(|| {
+            wrong(&member, format!("shape {shape:?}, expected (swings, 3, 3) or (swings, 5, 3)"))
+        })
     }
 
     /// Shape and values of a member under `spline/`.

@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::sha256_hex;
 use crate::heightfield::Grid;
+use crate::leg::LegSpec;
 use crate::planner::Seconds;
-use crate::robot::Box3;
-use crate::scenario::Formulation;
+use crate::robot::{Box3, Robot};
+use crate::scenario::{Formulation, Legs, Scenario};
 use crate::warp::MapGrid;
 
 /// Name, shape, values in C order.
@@ -52,6 +53,8 @@ pub struct Plan {
     pub foot_names: Vec<String>,
     /// (E,)
     pub foot_adhesive: Vec<bool>,
+    /// What follows from the legs' mass, where they have one.
+    pub legs: Option<LegSamples>,
     /// Counterparts in F, when planned there.
     pub warped: Option<WarpedSamples>,
     /// Alternating stance and swing durations by foot, s, stance first.
@@ -82,6 +85,15 @@ impl Plan {
         let bytes: Vec<u8> = columns.into_iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         sha256_hex(bytes)
     }
+}
+
+/// What follows from the legs' mass.
+#[derive(Clone, Debug)]
+pub struct LegSamples {
+    /// (N,) the center of mass from where it is in the trunk at the nominal stance; base frame, m.
+    pub shift: Vec<[f64; 3]>,
+    /// (N,) of the whole robot about its center of mass; world frame, kg m²/s.
+    pub angular_momentum: Vec<[f64; 3]>,
 }
 
 /// Warped-space counterparts of the samples.
@@ -184,6 +196,22 @@ pub struct MetaRobot {
     /// Radius of a foot, m; 0 in plans of version 0.1.0 and before.
     #[serde(default)]
     pub foot_radius: f64,
+    /// The legs by foot, with the masses of their links; empty where the plan has massless legs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub legs: Vec<LegSpec>,
+    /// The nominal places of the feet, base frame, m; empty in plans of version 0.1.0 and before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub nominal: Vec<[f64; 3]>,
+}
+
+impl MetaRobot {
+    /// [`Self::legs`] of a robot in a scenario.
+    pub fn legs_of(robot: &Robot, scenario: &Scenario) -> Vec<LegSpec> {
+        if scenario.legs() == Legs::Massless || robot.body().is_none() {
+            return Vec::new();
+        }
+        robot.feet.iter().filter_map(|foot| foot.leg.clone()).collect()
+    }
 }
 
 /// `meta.limits`: what the scenario sets, defaults included.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{GroundGrid, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
+use super::{GroundGrid, LegSamples, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
 use crate::Result;
 use crate::files::npz::NpzReader;
 use crate::robot::is_name;
@@ -42,6 +42,7 @@ impl Plan {
         }
 
         let warped = read_warped(&mut npz, n, e)?;
+        let legs = read_legs(&mut npz, n)?;
 
         let (shape, history_objective) = npz.finite_f64("history_objective")?;
         let iterations = history_objective.len();
@@ -64,6 +65,7 @@ impl Plan {
             foot_normal: npz.points("foot_normal", &[n, e])?,
             foot_adhesive: npz.bool("foot_adhesive", &[e])?,
             warped,
+            legs,
             phase_durations: read_phases(&mut npz, e)?,
             splines: read_splines(&mut npz)?,
             ground: read_ground(&mut npz)?,
@@ -240,6 +242,17 @@ fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<Option<WarpedS
         base,
         foot_position: npz.points("warped_foot_position", &[n, e])?,
         foot_force: npz.points("warped_foot_force", &[n, e])?,
+    }))
+}
+
+/// What follows from the legs' mass, if they have one.
+fn read_legs(npz: &mut NpzReader, n: usize) -> Result<Option<LegSamples>> {
+    if !["center_of_mass_shift", "angular_momentum"].iter().any(|name| npz.has(name)) {
+        return Ok(None);
+    }
+    Ok(Some(LegSamples {
+        shift: npz.points("center_of_mass_shift", &[n])?,
+        angular_momentum: npz.points("angular_momentum", &[n])?,
     }))
 }
 

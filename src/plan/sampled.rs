@@ -5,7 +5,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use nalgebra::Vector3;
 
 use super::{
-    GroundGrid, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedBase, WarpedSamples,
+    GroundGrid, LegSamples, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedBase,
+    WarpedSamples,
 };
 use crate::ipopt::IterationRecord;
 use crate::nlp::Model;
@@ -15,11 +16,11 @@ use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::{Ground, Patch};
 use crate::trajectory::Layout;
 use crate::trajectory::sampling::{self, FootMotion};
-use crate::trajectory::variables::FootVariables;
+use crate::trajectory::variables::{FootVariables, SwingVariables};
 use crate::warp::WarpMap;
 
 /// Samples of a plan within one time step.
-pub const SAMPLES_A_STEP: usize = 10;
+pub const SAMPLES_A_STEP: usize = crate::planner::FINE;
 
 /// What a plan carries besides the motion.
 pub struct Provenance<'a> {
@@ -94,6 +95,10 @@ impl Plan {
             foot_names: model.foot_names.clone(),
             foot_adhesive: model.adhesive.clone(),
             warped: None,
+            legs: motion.legs.as_ref().map(|legs| LegSamples {
+                shift: legs.shift.iter().map(|v| (*v).into()).collect(),
+                angular_momentum: legs.angular_momentum.iter().map(|v| (*v).into()).collect(),
+            }),
             phase_durations: phase_durations(&model.layout),
             splines: splines(motion),
             ground: ground_grid(provenance.ground),
@@ -189,6 +194,8 @@ fn meta_robot(model: &Model, loaded: &LoadedScenario) -> MetaRobot {
         reach: model.reach.clone(),
         torso: robot.torso,
         foot_radius: robot.foot_radius(),
+        legs: MetaRobot::legs_of(robot, &loaded.scenario),
+        nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
     }
 }
 
@@ -221,9 +228,10 @@ fn splines(motion: &Motion) -> Vec<(String, Vec<usize>, Vec<f64>)> {
     for (name, foot) in model.foot_names.iter().zip(&layout.feet) {
         let footholds: Vec<f64> = foot.stances.iter().flat_map(|s| s.foothold.value::<3>(x)).collect();
         splines.push((format!("{name}_footholds"), vec![foot.stances.len(), 3], footholds));
-        let swings: Vec<f64> =
-            foot.swings.iter().flat_map(|s| x[s.control_points..s.control_points + 9].to_vec()).collect();
-        splines.push((format!("{name}_swing_control_points"), vec![foot.swings.len(), 3, 3], swings));
+        let free = layout.swing_shape.free();
+        let points = |s: &SwingVariables| x[s.control_points..][..3 * free].to_vec();
+        let swings: Vec<f64> = foot.swings.iter().flat_map(points).collect();
+        splines.push((format!("{name}_swing_control_points"), vec![foot.swings.len(), free, 3], swings));
         let mut forces = vec![0.0; 3 * (intervals + 1)];
         for stance in &foot.stances {
             for (k, node) in stance.free_forces() {

@@ -29,6 +29,9 @@ impl Plan {
         npz.add_str("foot_names", &[e], &self.foot_names)?;
         npz.add_bool("foot_adhesive", &[e], &self.foot_adhesive)?;
 
+        for (name, values) in self.leg_members() {
+            npz.add_points(name, &[n], values)?;
+        }
         if let Some(warped) = &self.warped {
             if let Some(base) = &warped.base {
                 npz.add_points("warped_base_position", &[n], &base.position)?;
@@ -100,6 +103,13 @@ impl Plan {
         ]
     }
 
+    /// The arrays of shape (N, 3) that follow from the legs' mass, by member name.
+    fn leg_members(&self) -> impl Iterator<Item = (&'static str, &Vec<[f64; 3]>)> {
+        self.legs.iter().flat_map(|legs| {
+            [("center_of_mass_shift", &legs.shift), ("angular_momentum", &legs.angular_momentum)]
+        })
+    }
+
     /// The solver's history, by member name.
     fn history_members(&self) -> [(&'static str, &Vec<f64>); 3] {
         [
@@ -115,7 +125,8 @@ impl Plan {
         let (n, e) = (self.t.len(), self.foot_names.len());
         let base = self.base_members().map(|(name, values)| (name, n, values));
         let feet = self.foot_members().map(|(name, values)| (name, n * e, values));
-        for (name, length, values) in base.into_iter().chain(feet) {
+        let legs = self.leg_members().map(|(name, values)| (name, n, values));
+        for (name, length, values) in base.into_iter().chain(feet).chain(legs) {
             ensure(name, values.len() == length, values.iter().flatten())?;
         }
         ensure("t", n >= 2, &self.t)?;

@@ -10,7 +10,6 @@ use crate::scenario::Scenario;
 use crate::terrain::Patch;
 use crate::trajectory::rotation::euler;
 use crate::trajectory::space::Space;
-use crate::trajectory::spline::SWING_CONTROL_POINTS;
 use crate::trajectory::switches;
 use crate::warp::Order;
 
@@ -81,7 +80,7 @@ fn set_swings(apex: f64, footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut
                 (Some(from), Some(to)) => Some((from, to)),
                 _ => None,
             };
-            for c in 0..SWING_CONTROL_POINTS {
+            for c in 0..model.layout.swing_shape.free() {
                 let point = match over_edges {
                     Some((from, to)) => over_edge(apex, [from, to], c, model)?,
                     None => over_smooth_ground(apex, [ends[0], ends[1]], c, model),
@@ -95,7 +94,7 @@ fn set_swings(apex: f64, footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut
 
 /// The c-th control point of a swing over smooth ground.
 fn over_smooth_ground(apex: f64, ends: [Vector3<f64>; 2], c: usize, model: &Model) -> Vector3<f64> {
-    let fraction = (c + 1) as f64 / (SWING_CONTROL_POINTS + 1) as f64;
+    let fraction = (c + 1) as f64 / (model.layout.swing_shape.free() + 1) as f64;
     let mut point = ends[0] + (ends[1] - ends[0]) * fraction;
     point.z = if model.spaces.feet.is_warped() {
         apex
@@ -113,7 +112,7 @@ fn over_edge(apex: f64, patches: [&Patch; 2], c: usize, model: &Model) -> Result
         .map(|n| between(n as f64 / WAY_SAMPLES as f64))
         .map(|q| model.surfaces.feet.height(q.x, q.y))
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut point = between(c as f64 / (SWING_CONTROL_POINTS - 1) as f64);
+    let mut point = between(c as f64 / (model.layout.swing_shape.free() - 1) as f64);
     point.z = top + apex;
     pulled_back(&model.spaces.feet, &point)
 }

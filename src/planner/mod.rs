@@ -9,6 +9,7 @@
 //! | `steps` | how many steps a motion takes over edges, and where |
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | `travel` | whether the goal is within range at all |
+//! | `legs` | what the legs' own mass adds to the laws, from a motion |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | [`stage`] | which stages there are |
@@ -24,6 +25,7 @@ pub mod derivatives;
 mod foothold_search;
 mod footholds;
 pub mod guess;
+pub mod legs;
 pub mod motion;
 mod options;
 pub mod problem;
@@ -37,6 +39,7 @@ mod threads;
 mod travel;
 pub mod violation;
 
+pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
 pub use solve::{Host, Progress, Task, solve};

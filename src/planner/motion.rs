@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::legs::LegMotion;
 use super::violation::BlockViolation;
 use crate::ipopt::{IterationRecord, LinearSolver};
 use crate::nlp::Model;
@@ -27,6 +28,8 @@ pub struct Motion {
     pub model: Model,
     /// The variables.
     pub x: Vec<f64>,
+    /// What follows from the legs' mass, where they have one.
+    pub legs: Option<LegMotion>,
     /// How the solve ended, in words.
     pub status: String,
     /// Every constraint holds to the tolerance.

@@ -35,3 +35,19 @@ pub(super) fn of(solver: &SolverSpec, hessian: Hessian, centered: bool, max_iter
         .set_num("compl_inf_tol", 1e-3)
         .set_int("acceptable_iter", 0)
 }
+
+/// How near to a bound a warm start may be, relative to its scale.
+const WARM_PUSH: f64 = 1e-9;
+
+/// The same from the solution of nearly the same problem, with its multipliers and barrier parameter μ.
+pub(super) fn warm(options: Options, mu: f64) -> Options {
+    let pushes = [
+        "warm_start_bound_push",
+        "warm_start_bound_frac",
+        "warm_start_slack_bound_push",
+        "warm_start_slack_bound_frac",
+        "warm_start_mult_bound_push",
+    ];
+    let options = options.set_str("warm_start_init_point", "yes").set_num("mu_init", mu);
+    pushes.into_iter().fold(options, |options, name| options.set_num(name, WARM_PUSH))
+}

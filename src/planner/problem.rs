@@ -20,14 +20,15 @@ use crate::costs::base_acceleration::BaseAcceleration;
 use crate::costs::force_rate::ForceRate;
 use crate::costs::posture::Posture;
 use crate::costs::swing_acceleration::SwingAcceleration;
-use crate::ipopt::NlpProblem;
+use crate::ipopt::{Multipliers, NlpProblem};
 use crate::scenario::{Cone, Law, Scenario};
-use crate::trajectory::spline::SWING_CONTROL_POINTS;
+
+use nalgebra::Vector3;
 
 use super::threads::ThreadSplit;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::sink::{Gradient, Pattern, Sink};
-use crate::nlp::{Constraint, Cost, Model, State};
+use crate::nlp::{Constraint, Cost, LegTerms, Model, State, foot_in_base};
 
 /// The objective is this times the scenario's costs: Ipopt's tests of optimality are absolute, and with an objective of the
 /// order of one a solve takes a third of the iterations (rippled, medium: 25 instead of 65).
@@ -55,6 +56,8 @@ pub struct GaitProblem {
     evaluated: Vec<f64>,
     curved: bool,
     initial: Vec<f64>,
+    /// To start from, if there are any.
+    pub multipliers: Option<Multipliers>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -160,6 +163,7 @@ impl GaitProblem {
             jacobian,
             hessian,
             initial,
+            multipliers: None,
             lower,
             upper,
         }
@@ -194,6 +198,24 @@ impl GaitProblem {
         }
     }
 
+    /// By how much the torques that the legs' mass adds to Euler's law at x differ from others: root mean square and largest, m g · 1 m.
+    pub fn leg_torque_change(&mut self, x: &[f64], other: &LegTerms) -> [f64; 2] {
+        self.update(x, false);
+        let samples = self.model.layout.intervals + 1;
+        let torques = |terms: &LegTerms| -> Vec<Vector3<f64>> {
+            let mut torques: Vec<Vector3<f64>> = (0..samples).map(|k| terms.torque(k)).collect();
+            for inertia in &terms.inertia {
+                torques[inertia.sample] += foot_in_base::inertial_torque(&self.model, &self.state, inertia);
+            }
+            torques
+        };
+        let (ours, theirs) = (torques(&self.model.leg_terms), torques(other));
+        let squares = ours.iter().zip(&theirs).map(|(a, b)| (a - b).norm_squared());
+        let (sum, most) =
+            squares.fold((0.0, 0.0_f64), |(sum, most), square| (sum + square, most.max(square)));
+        [(sum / samples as f64).sqrt(), most.sqrt()]
+    }
+
     /// Name of a variable, for messages.
     pub fn variable_name(&self, v: usize) -> String {
         let layout = &self.model.layout;
@@ -217,7 +239,7 @@ impl GaitProblem {
                 }
             }
             for (j, swing) in foot.swings.iter().enumerate() {
-                if (swing.control_points..swing.control_points + 3 * SWING_CONTROL_POINTS).contains(&v) {
+                if (swing.control_points..swing.control_points + 3 * layout.swing_shape.free()).contains(&v) {
                     return format!("{name} swing {j} control point {}", (v - swing.control_points) / 3);
                 }
                 match swing.switches {
@@ -241,7 +263,7 @@ fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     upper[..6].copy_from_slice(&initial[..6]);
     for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
         if model.spaces.feet.is_warped() && !model.surfaces.have_edges() {
-            for c in 0..SWING_CONTROL_POINTS {
+            for c in 0..model.layout.swing_shape.free() {
                 lower[swing.control_points + 3 * c + 2] = 0.0;
             }
         }
@@ -356,6 +378,10 @@ impl NlpProblem for GaitProblem {
 
     fn initial_point(&self, x: &mut [f64]) {
         x.copy_from_slice(&self.initial);
+    }
+
+    fn initial_multipliers(&self) -> Option<Multipliers> {
+        self.multipliers.clone()
     }
 
     fn objective(&mut self, x: &[f64], _new_x: bool) -> f64 {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::guess;
+use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
 use super::options;
 use super::problem::{Choice, GaitProblem};
@@ -13,8 +14,8 @@ use super::steps::Steps;
 use super::stopping::StoppingRule;
 use super::violation;
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, IterationRecord, LinearSolver, Status};
-use crate::nlp::Model;
+use crate::ipopt::{self, IterationRecord, LinearSolver, Multipliers, Status};
+use crate::nlp::{LegTerms, Model};
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
 use crate::terrain::Surfaces;
@@ -28,6 +29,12 @@ const CONTINUATION_STEPS: u32 = 3;
 const LEVEL: f64 = 1e-6;
 /// Fraction of the iterations that the plain solve may take when a continuation may follow.
 const PLAIN_FRACTION: f64 = 0.5;
+/// Solves with another estimate of what the legs' mass adds, at most.
+const LEG_ROUNDS: usize = 6;
+/// By how much the torque that it adds may still change, rms and at most, m g · 1 m.
+const LEG_TOLERANCE: [f64; 2] = [0.0015 * LEVER, 0.005 * LEVER];
+/// m, with which torques are compared with the weight.
+const LEVER: f64 = 0.3;
 
 /// What is to be planned.
 #[derive(Clone, Copy)]
@@ -59,8 +66,9 @@ impl Task<'_> {
     /// # Errors
     /// Those of the guess.
     pub fn problem(&self) -> Result<GaitProblem> {
-        let model = self.model()?;
+        let mut model = self.model()?;
         let x = guess::guess(self.scenario, &model)?;
+        model.leg_terms = legs::terms(&model, &x, self.scenario.physics.law).unwrap_or_default();
         Ok(GaitProblem::new(self.scenario, model, x, Choice { with_costs: true, exact_hessian: true }))
     }
 }
@@ -109,6 +117,7 @@ pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let budget = (solver.max_iterations as f64 * fraction) as usize;
     let mut solve = Solve::new(task, host);
     let first = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
+    let first = solve.with_leg_mass(first)?;
     if first.feasible || first.interrupted {
         return Ok(solve.finish(first));
     }
@@ -138,12 +147,14 @@ fn is_level(ground: &Heightfield) -> bool {
 }
 
 /// Where a stage starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Start {
     /// At the guess.
     Guess,
     /// At a point that obeys all constraints, or did before some were added or the terrain grew.
     Feasible,
+    /// At the solution of nearly the same problem, with its multipliers and barrier parameter.
+    Warm(Multipliers, f64),
 }
 
 /// How a stage ended.
@@ -151,6 +162,9 @@ struct StageEnd {
     stage: Stage,
     problem: GaitProblem,
     x: Vec<f64>,
+    /// At x, and the barrier parameter μ there.
+    multipliers: Multipliers,
+    mu: f64,
     feasible: bool,
     interrupted: bool,
     status: String,
@@ -195,8 +209,9 @@ impl<'a> Solve<'a> {
     /// Over ground with edges the guess is good, because the footholds and the timing of the base were chosen; a feasible point
     /// without joints and costs would be a worse start (docs/results.md).
     fn at_once(&mut self, budget: usize) -> Result<StageEnd> {
-        let model = self.task.model()?;
+        let mut model = self.task.model()?;
         let x = self.guess(&model)?;
+        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
         self.stage(Stage::Whole, model, x, Start::Guess, self.task.scenario.solver.effort, budget)
     }
 
@@ -206,8 +221,9 @@ impl<'a> Solve<'a> {
     /// arbitrary at the guess. Out of the pit this takes a third of the iterations of solving everything at once, and converges
     /// where that does not (docs/results.md).
     fn joints_last(&mut self, budget: usize) -> Result<StageEnd> {
-        let model = self.task.model()?;
+        let mut model = self.task.model()?;
         let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
+        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
         if model.legs.iter().any(Option::is_some) {
             let mut rough = model.clone();
             rough.legs.fill(None);
@@ -217,6 +233,7 @@ impl<'a> Solve<'a> {
                 return Ok(rough);
             }
             (x, start) = (rough.x, Start::Feasible);
+            model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
         }
         let left = budget.saturating_sub(self.iterations);
         self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
@@ -274,6 +291,54 @@ impl<'a> Solve<'a> {
         Ok(Some(Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces)))
     }
 
+    /// Solves again with what the legs' mass adds to the laws along the last motion, until that no longer changes.
+    fn with_leg_mass(&mut self, mut end: StageEnd) -> Result<StageEnd> {
+        for round in 1.. {
+            let left = self.task.scenario.solver.max_iterations.saturating_sub(self.iterations);
+            if !end.feasible || end.interrupted {
+                break;
+            }
+            let Some(terms) = self.leg_terms(&end.problem.model, &end.x) else { break };
+            let [rms, most] = end.problem.leg_torque_change(&end.x, &terms);
+            if rms < LEG_TOLERANCE[0] && most < LEG_TOLERANCE[1] {
+                break;
+            }
+            if round > LEG_ROUNDS || left == 0 {
+                let percent = 100.0 * rms / LEVER;
+                end.status = format!(
+                    "{}; the torques of the legs' mass have not settled, by {percent:.2} % of m g · 0.3 m",
+                    end.status
+                );
+                break;
+            }
+            let mut model = end.problem.model.clone();
+            model.leg_terms = terms;
+            let start = Start::Warm(end.multipliers, end.mu);
+            let status = end.status;
+            end = self.stage(
+                Stage::LegMass { round },
+                model,
+                end.x,
+                start,
+                self.task.scenario.solver.effort,
+                left,
+            )?;
+            if end.feasible && !end.interrupted {
+                // It ends at the first feasible point, because it starts at the solution of nearly the same problem.
+                end.status = status;
+            }
+        }
+        Ok(end)
+    }
+
+    /// What the legs' mass adds along the motion x; none for massless legs.
+    fn leg_terms(&mut self, model: &Model, x: &[f64]) -> Option<LegTerms> {
+        let start = Instant::now();
+        let terms = legs::terms(model, x, self.task.scenario.physics.law);
+        self.seconds.evaluation += start.elapsed().as_secs_f64();
+        terms
+    }
+
     /// Solves from x with at most `budget` iterations.
     fn stage(
         &mut self,
@@ -295,10 +360,15 @@ impl<'a> Solve<'a> {
         let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
         let mut problem = GaitProblem::new(scenario, model, x, choice);
         let centered =
-            (start, hessian, scenario.formulation()) == (Start::Guess, Hessian::Exact, Formulation::Warped);
-        let options = options::of(&scenario.solver, hessian, centered, budget);
+            (&start, hessian, scenario.formulation()) == (&Start::Guess, Hessian::Exact, Formulation::Warped);
+        let mut options = options::of(&scenario.solver, hessian, centered, budget);
+        if let Start::Warm(multipliers, mu) = start {
+            problem.multipliers = Some(multipliers);
+            options = options::warm(options, mu);
+        }
 
-        let mut rule = StoppingRule::new(effort, with_costs, tolerance);
+        let rule_effort = if matches!(stage, Stage::LegMass { .. }) { Effort::Feasible } else { effort };
+        let mut rule = StoppingRule::new(rule_effort, with_costs, tolerance);
         let mut stopped = false;
         let (history, host) = (&mut self.history, &mut *self.host);
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
@@ -327,13 +397,19 @@ impl<'a> Solve<'a> {
         self.seconds.evaluation += solution.evaluation_seconds;
         self.seconds.linear_solver += solution.total_seconds - solution.evaluation_seconds;
 
+        let multipliers = Multipliers {
+            constraint: solution.constraint_multipliers,
+            lower: solution.lower_multipliers,
+            upper: solution.upper_multipliers,
+        };
+        let mu = solution.history.last().map_or(f64::NAN, |record| record.mu);
         let interrupted = stopped || solution.status == Status::Interrupted;
         let satisfied = rule.is_satisfied();
         let last_feasible = violation::is_feasible(&mut problem, &solution.x, tolerance);
         let x = rule.best(solution.x, solution.objective, last_feasible);
         let feasible = violation::is_feasible(&mut problem, &x, tolerance);
         let status = status(solution.status, feasible, satisfied, with_costs);
-        Ok(StageEnd { stage, problem, x, feasible, interrupted, status })
+        Ok(StageEnd { stage, problem, x, multipliers, mu, feasible, interrupted, status })
     }
 
     fn finish(mut self, mut end: StageEnd) -> Motion {
@@ -342,10 +418,16 @@ impl<'a> Solve<'a> {
         self.seconds.total = self.start.elapsed().as_secs_f64();
         // Plans are sampled from the motion as it is, at the switches that were found.
         end.problem.model.layout.freeze(&end.x);
+        let settled = BodyMotion::new(&end.problem.model, &end.x, FINE).and_then(|body| body.settled(&end.x));
+        if let Some((layout, x)) = settled {
+            (end.problem.model.layout, end.x) = (layout, x);
+        }
+        let legs = BodyMotion::new(&end.problem.model, &end.x, FINE).map(|body| body.samples());
         Motion {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,
             status: end.status,
+            legs,
             model: end.problem.model,
             x: end.x,
             iterations: self.iterations,

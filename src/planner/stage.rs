@@ -9,6 +9,11 @@ pub enum Stage {
     WithoutJoints,
     /// The scenario itself.
     Whole,
+    /// The scenario again, with what the legs' mass adds along the motion found before.
+    LegMass {
+        /// From 1.
+        round: usize,
+    },
     /// With the terrain at `step / steps` of its height.
     Continuation {
         /// From 1 to `steps`.
@@ -22,7 +27,7 @@ impl Stage {
     /// The terrain's height in this stage, as a fraction of the scenario's.
     pub fn height_fraction(self) -> f64 {
         match self {
-            Self::WithoutJoints | Self::Whole => 1.0,
+            Self::WithoutJoints | Self::Whole | Self::LegMass { .. } => 1.0,
             Self::Continuation { step, steps } => f64::from(step) / f64::from(steps),
         }
     }
@@ -31,7 +36,7 @@ impl Stage {
     pub fn is_whole(self) -> bool {
         match self {
             Self::WithoutJoints => false,
-            Self::Whole => true,
+            Self::Whole | Self::LegMass { .. } => true,
             Self::Continuation { step, steps } => step == steps,
         }
     }
@@ -47,6 +52,7 @@ impl fmt::Display for Stage {
         match self {
             Self::WithoutJoints => write!(f, "without joints"),
             Self::Whole => write!(f, "solve"),
+            Self::LegMass { round } => write!(f, "legs with mass, {round}"),
             Self::Continuation { .. } => {
                 write!(f, "continuation, terrain at {:.0} %", 100.0 * self.height_fraction())
             }

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use super::format::{Formulation, Scenario};
 use super::gait::GaitKind;
 use super::map::MapMethod;
-use super::motion::Law;
+use super::motion::{Law, Legs};
 use super::terrain::TerrainSpec;
 use crate::Result;
 use crate::input::{Document, closest};
@@ -31,6 +31,9 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     }
     time_steps(document, scenario)?;
     law(document, scenario)?;
+    if let Some(robot) = robot {
+        legs(document, scenario, robot)?;
+    }
     map(document, scenario)?;
     durations(document, scenario)?;
     phases(document, scenario)?;
@@ -129,6 +132,17 @@ fn time_steps(document: &Document, scenario: &Scenario) -> Result<()> {
             scenario.time_step, scenario.horizon
         );
         return Err(document.error("time_step", what));
+    }
+    Ok(())
+}
+
+fn legs(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    if scenario.physics.legs == Some(Legs::Massive) && robot.body().is_none() {
+        let what = format!(
+            "given \"massive\", but the file of robot {} has no links with masses ([[feet.leg.joints]] of every foot); use \"massless\" or leave it out",
+            robot.name
+        );
+        return Err(document.error("physics.legs", what));
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::gait::GaitSpec;
 use super::map::MapSpec;
 use super::motion::{
-    ContactSpec, DiscretizationSpec, Footholds, GoalSpec, MotionSpec, PhysicsSpec, StartSpec,
+    ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Legs, MotionSpec, PhysicsSpec, StartSpec,
 };
 use super::solver::SolverSpec;
 use super::terrain::TerrainSpec;
@@ -71,6 +71,15 @@ impl Scenario {
         self.formulation.unwrap_or(match self.footholds() {
             Footholds::Patches => Formulation::Hybrid,
             Footholds::Anywhere => Formulation::Warped,
+        })
+    }
+
+    /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is
+    /// massless: massive legs cost iterations and reach there (docs/results.md).
+    pub fn legs(&self) -> Legs {
+        self.physics.legs.unwrap_or(match self.footholds() {
+            Footholds::Patches => Legs::Massless,
+            Footholds::Anywhere => Legs::Massive,
         })
     }
 

@@ -21,7 +21,7 @@ pub use gait::{GaitKind, GaitSpec};
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
 pub use motion::{
-    Cone, ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Law, MotionSpec, PhysicsSpec, StartSpec,
+    Cone, ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Law, Legs, MotionSpec, PhysicsSpec, StartSpec,
 };
 pub use solver::{Continuation, ContinuationMode, Effort, Hessian, SolverSpec};
 pub use template::template;

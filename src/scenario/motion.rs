@@ -130,12 +130,25 @@ pub enum Law {
     NewtonEuler,
 }
 
+/// What the legs weigh in the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Legs {
+    /// The laws are those of a trunk and its legs' links.
+    Massive,
+    /// As in the paper: the robot is one rigid body.
+    Massless,
+}
+
 /// `[physics]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhysicsSpec {
     /// The form of the laws of motion.
     pub law: Law,
+    /// What the legs weigh; by default massive where the robot's file has the masses of their links and feet may stand anywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub legs: Option<Legs>,
 }
 
 /// `[discretization]`.

@@ -246,6 +246,14 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
             ],
         ),
         (
+            with("horizon = 10", "horizon = 10\nrobot.name = \"anymal_towr\"\nphysics.legs = \"massive\""),
+            vec!["s.toml:4: physics.legs: given \"massive\"", "anymal_towr has no links", "massless"],
+        ),
+        (
+            with("horizon = 10", "horizon = 10\nphysics.legs = \"light\""),
+            vec!["s.toml:3: physics.legs: given \"light\"", "\"massive\", \"massless\""],
+        ),
+        (
             with("kind = \"rippled\"", "kind = \"flat\"\nextent = [3.0, -3.0, 0.0, 1.0]"),
             vec!["s.toml:5: terrain.extent: given [3, -3"],
         ),

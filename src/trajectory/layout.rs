@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, if coarser, at about every n-th); the first three coincide, and so do the last three, so that the motion starts and ends at rest |
 //! | footholds | (x̄, ȳ, z̄) of each stance |
-//! | swings | three inner control points of a clamped cubic B-spline; its outer two on each side are the footholds, so that feet lift off and touch down with zero velocity |
+//! | swings | the inner control points of a clamped cubic B-spline; its outer ones on each side are the footholds, so that feet lift off and touch down at rest ([`SwingShape`]) |
 //! | forces | f̄ at every sample of a stance (or, if coarser, at about every n-th) except at the switches, where it is zero; linear in between |
 //! | switches | lift-off and touch-down of each swing in samples, if durations are optimized; see [`super::switches`] |
 //!
@@ -19,7 +19,7 @@ use super::gait::Gait;
 use super::instant::Instant;
 use super::node::LinearNode;
 use super::phase::Stance;
-use super::spline::{SWING_CONTROL_POINTS, SWING_POINTS, swing_basis};
+use super::spline::{SwingShape, swing_basis};
 use super::switches::{TimedNode, force_samples};
 use super::variables::{FootVariables, StanceVariables, SwingVariables};
 use crate::bspline::uniform_cubic;
@@ -59,6 +59,8 @@ pub struct Layout {
     pub base_between: Vec<LinearNode>,
     /// Velocity and acceleration of the base at each sample, six components.
     pub base_rates: Vec<[LinearNode; 2]>,
+    /// How swings are made of control points.
+    pub swing_shape: SwingShape,
     /// Number of distinct control points of the base.
     pub base_blocks: usize,
     /// The variables of each foot.
@@ -73,13 +75,19 @@ pub struct Layout {
 
 impl Layout {
     /// The variables for a gait.
-    pub fn new(gait: &Gait, time_step: f64, spacing: KnotSpacing) -> Self {
+    pub fn new(gait: &Gait, time_step: f64, spacing: KnotSpacing, swing_shape: SwingShape) -> Self {
         let base_intervals = pieces(gait.intervals, spacing.base).max(2);
-        Self::with_base_intervals(gait, time_step, base_intervals, spacing.force)
+        Self::with_base_intervals(gait, time_step, base_intervals, spacing.force, swing_shape)
     }
 
     /// The same with a given number of knot intervals of the base, at least two.
-    pub fn with_base_intervals(gait: &Gait, time_step: f64, base_intervals: usize, force: usize) -> Self {
+    pub fn with_base_intervals(
+        gait: &Gait,
+        time_step: f64,
+        base_intervals: usize,
+        force: usize,
+        swing_shape: SwingShape,
+    ) -> Self {
         let base_blocks = base_intervals - 1;
         let mut layout = Self {
             time_step,
@@ -89,6 +97,7 @@ impl Layout {
             base: Vec::new(),
             base_between: Vec::new(),
             base_rates: Vec::new(),
+            swing_shape,
             base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
@@ -129,7 +138,7 @@ impl Layout {
         for &swing in swings {
             swing_variables.push(SwingVariables {
                 swing,
-                control_points: self.allocate(3 * SWING_CONTROL_POINTS),
+                control_points: self.allocate(3 * self.swing_shape.free()),
                 switches: swing.is_free().then(|| self.allocate(2)),
             });
         }
@@ -194,6 +203,39 @@ impl Layout {
         self.phase[foot] = times.map(|time| self.phase_of(foot, time)).collect();
         let middles = (0..self.intervals).map(|k| Instant::Between(k).time());
         self.phase_between[foot] = middles.map(|time| self.phase_of(foot, time)).collect();
+    }
+
+    /// The same motion with a base whose spline has a knot at every 1/`factor` of a sample, and the variables that go with it: control
+    /// points through given values at these knots, of which there are `factor` times the intervals and one more. None if the present knots
+    /// are not among them.
+    ///
+    /// A cubic spline with finer knots can equal any with coarser ones, so what is the same at the knots is the same between them. (At the
+    /// two knots next to the ends, where the base is at rest, the values are those that follow from the others.)
+    pub fn with_fine_base(&self, x: &[f64], factor: usize, values: &[[f64; 6]]) -> Option<(Self, Vec<f64>)> {
+        let fine = self.intervals * factor;
+        if !fine.is_multiple_of(self.base_intervals) || values.len() != fine + 1 {
+            return None;
+        }
+        let (before, mut layout) = (6 * self.base_blocks, self.clone());
+        layout.base_intervals = fine;
+        layout.base_blocks = fine - 1;
+        let more = 6 * layout.base_blocks - before;
+        layout.variables += more;
+        layout.feet.iter_mut().for_each(|foot| foot.move_variables(more));
+        layout.set_base();
+        // Block b is control point b + 2: the value at knot j is that of blocks j − 2, j − 1, j with weights 1/6, 2/3, 1/6.
+        let ends = [values[0], values[fine]];
+        let mut points: Vec<[f64; 6]> = values[2..fine - 1].iter().map(|v| v.map(|v| 6.0 * v)).collect();
+        let last = points.len() - 1;
+        for d in 0..6 {
+            points[0][d] -= ends[0][d];
+            points[last][d] -= ends[1][d];
+        }
+        solve_tridiagonal(4.0, 1.0, &mut points);
+        let mut fine_x: Vec<f64> = Vec::with_capacity(layout.variables);
+        fine_x.extend(std::iter::once(&ends[0]).chain(&points).chain(std::iter::once(&ends[1])).flatten());
+        fine_x.extend_from_slice(&x[before..]);
+        Some((layout, fine_x))
     }
 
     /// Replaces the switches by their values at x for good: the phases, feet and forces become those of the motion x.
@@ -285,21 +327,21 @@ impl Layout {
     /// A foot at u ∈ [0, 1] of swing `j`, or its first or second derivative with respect to u.
     pub fn swing_node(&self, foot: usize, j: usize, u: f64, derivative: usize) -> LinearNode {
         let mut node = LinearNode::default();
-        for (variable, weight) in self.swing_variables(foot, j).into_iter().zip(swing_basis(u)[derivative]) {
-            node.push(variable, weight);
+        let basis = swing_basis(self.swing_shape, u);
+        for (variable, weight) in self.swing_variables(foot, j).into_iter().zip(&basis[derivative]) {
+            node.push(variable, *weight);
         }
         node
     }
 
     /// The first variables of a swing's foothold, control points and next foothold.
-    fn swing_variables(&self, foot: usize, j: usize) -> [usize; SWING_POINTS] {
+    fn swing_variables(&self, foot: usize, j: usize) -> Vec<usize> {
         let variables = &self.feet[foot];
         let first = variables.swings[j].control_points;
-        std::array::from_fn(|c| match c {
-            0 => variables.stances[j].foothold.first(),
-            c if c <= SWING_CONTROL_POINTS => first + 3 * (c - 1),
-            _ => variables.stances[j + 1].foothold.first(),
-        })
+        let mut points = vec![variables.stances[j].foothold.first()];
+        points.extend((0..self.swing_shape.free()).map(|c| first + 3 * c));
+        points.push(variables.stances[j + 1].foothold.first());
+        points
     }
 
     /// Longest time from one lift-off of a foot to the next, s; the whole motion if it lifts off at most once.
@@ -314,7 +356,7 @@ impl Layout {
         if let Phase::Swing(j) = self.phase_at(foot, instant)
             && let Some(lift_off) = self.feet[foot].swings[j].switches
         {
-            return TimedNode::moving(instant.time(), self.swing_variables(foot, j), lift_off);
+            return TimedNode::moving(instant.time(), &self.swing_variables(foot, j), lift_off);
         }
         TimedNode::given(self.foot_node(foot, instant.time(), 0))
     }
@@ -340,6 +382,20 @@ impl Layout {
     }
 }
 
+/// Solves, for each component, a symmetric system with a constant diagonal and a constant entry beside it, less than half of that.
+pub fn solve_tridiagonal<const D: usize>(diagonal: f64, beside: f64, values: &mut [[f64; D]]) {
+    let mut pivots = vec![diagonal; values.len()];
+    for i in 1..values.len() {
+        let factor = beside / pivots[i - 1];
+        pivots[i] -= factor * beside;
+        values[i] = std::array::from_fn(|d| values[i][d] - factor * values[i - 1][d]);
+    }
+    for i in (0..values.len()).rev() {
+        let after = if i + 1 < values.len() { values[i + 1] } else { [0.0; D] };
+        values[i] = std::array::from_fn(|d| (values[i][d] - beside * after[d]) / pivots[i]);
+    }
+}
+
 /// Weights below this, relative to the scale of a derivative, are zero up to rounding.
 const CANCELLED: f64 = 1e-14;
 
@@ -362,7 +418,7 @@ mod tests {
             intervals: 20,
             swings: vec![vec![Swing::given(4.0, 8.0)], vec![Swing::given(10.0, 15.0)], vec![], vec![]],
         };
-        Layout::new(&gait, 0.05, spacing)
+        Layout::new(&gait, 0.05, spacing, SwingShape::Light)
     }
 
     #[test]

@@ -1,22 +1,63 @@
 //! The clamped cubic B-spline of a swinging foot. (That of the base is uniform, see `bspline.rs`.)
 
-/// Number of free control points of a swing. The two on each side of them are at the footholds.
-pub const SWING_CONTROL_POINTS: usize = 3;
-/// Number of knot intervals of a swing.
-pub const SWING_INTERVALS: usize = SWING_CONTROL_POINTS + 1;
-/// Number of distinct control points of a swing: a foothold, the free ones, the next foothold.
-pub const SWING_POINTS: usize = SWING_CONTROL_POINTS + 2;
-
-/// The basis of a swing at u ∈ [0, 1], and its first and second derivatives with respect to u, by distinct control point. The two
-/// basis functions of each foothold are added up, so that the foot lifts off and touches down with zero velocity.
-pub fn swing_basis(u: f64) -> [[f64; SWING_POINTS]; 3] {
-    clamped_cubic(u).map(|b| [b[0] + b[1], b[2], b[3], b[4], b[5] + b[6]])
+/// How a swing is made of control points. The first and the last ones are the footholds, so that the foot leaves and lands at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SwingShape {
+    /// Three free control points and two at each foothold: no velocity at both ends. For massless legs.
+    Light,
+    /// Five free control points and three at each foothold: neither velocity nor acceleration at both ends, so that no torque jumps. For
+    /// legs with mass.
+    Smooth,
 }
 
-/// All basis functions of a cubic B-spline at u ∈ [0, 1], and their first and second derivatives. The [`SWING_INTERVALS`] knot
+impl SwingShape {
+    /// Number of free control points.
+    pub fn free(self) -> usize {
+        match self {
+            Self::Light => 3,
+            Self::Smooth => 5,
+        }
+    }
+
+    /// The shape with a number of free control points, if there is one.
+    pub fn with_free(free: usize) -> Option<Self> {
+        [Self::Light, Self::Smooth].into_iter().find(|shape| shape.free() == free)
+    }
+
+    /// How many control points are at each foothold.
+    fn repeated(self) -> usize {
+        match self {
+            Self::Light => 2,
+            Self::Smooth => 3,
+        }
+    }
+
+    /// Number of distinct control points: a foothold, the free ones, the next foothold.
+    pub fn points(self) -> usize {
+        self.free() + 2
+    }
+
+    /// Number of knot intervals.
+    pub fn intervals(self) -> usize {
+        self.free() + 2 * self.repeated() - 3
+    }
+}
+
+/// The basis of a swing at u ∈ [0, 1], and its first and second derivatives with respect to u, by distinct control point. The
+/// basis functions of each foothold are added up.
+pub fn swing_basis(shape: SwingShape, u: f64) -> [Vec<f64>; 3] {
+    let (ends, free) = (shape.repeated(), shape.free());
+    clamped_cubic(shape.intervals(), u).map(|b| {
+        let mut by_point = vec![b[..ends].iter().sum()];
+        by_point.extend_from_slice(&b[ends..ends + free]);
+        by_point.push(b[ends + free..].iter().sum());
+        by_point
+    })
+}
+
+/// All basis functions of a cubic B-spline at u ∈ [0, 1], and their first and second derivatives. The knot
 /// intervals are equal and the end knots fourfold, so that the spline starts and ends at its outer control points.
-fn clamped_cubic(u: f64) -> [Vec<f64>; 3] {
-    let intervals = SWING_INTERVALS;
+fn clamped_cubic(intervals: usize, u: f64) -> [Vec<f64>; 3] {
     let knots: Vec<f64> =
         (0..intervals + 7).map(|i| (i.saturating_sub(3).min(intervals)) as f64 / intervals as f64).collect();
     let u = u.clamp(0.0, 1.0);
@@ -56,44 +97,36 @@ fn differentiated(knots: &[f64], p: usize, lower: &[f64]) -> Vec<f64> {
 #[derive(Clone, Debug)]
 pub struct SwingBasis {
     /// `coefficients[interval][m][power]` of the distance in u from the start of the interval.
-    coefficients: [[[f64; 4]; SWING_POINTS]; SWING_INTERVALS],
+    coefficients: Vec<Vec<[f64; 4]>>,
 }
 
 impl SwingBasis {
     /// From the values and derivatives at the knots.
-    pub fn new() -> Self {
-        let width = 1.0 / SWING_INTERVALS as f64;
-        let knots: Vec<[[f64; SWING_POINTS]; 3]> =
-            (0..=SWING_INTERVALS).map(|i| swing_basis(i as f64 * width)).collect();
-        Self {
-            coefficients: std::array::from_fn(|i| {
-                let (left, right) = (&knots[i], &knots[i + 1]);
-                std::array::from_fn(|m| {
+    pub fn new(shape: SwingShape) -> Self {
+        let intervals = shape.intervals();
+        let width = 1.0 / intervals as f64;
+        let knots: Vec<[Vec<f64>; 3]> =
+            (0..=intervals).map(|i| swing_basis(shape, i as f64 * width)).collect();
+        let piece = |ends: &[[Vec<f64>; 3]]| -> Vec<[f64; 4]> {
+            let (left, right) = (&ends[0], &ends[1]);
+            (0..shape.points())
+                .map(|m| {
                     let third = (right[2][m] - left[2][m]) / width;
                     [left[0][m], left[1][m], 0.5 * left[2][m], third / 6.0]
                 })
-            }),
-        }
+                .collect()
+        };
+        Self { coefficients: knots.windows(2).map(piece).collect() }
     }
 
-    /// The weights and their first and second derivatives at u, which is clamped to [0, 1].
-    pub fn at(&self, u: f64) -> [[f64; SWING_POINTS]; 3] {
-        let u = u.clamp(0.0, 1.0);
-        let i = ((u * SWING_INTERVALS as f64) as usize).min(SWING_INTERVALS - 1);
-        let s = u - i as f64 / SWING_INTERVALS as f64;
-        let mut weights = [[0.0; SWING_POINTS]; 3];
-        for (m, [c0, c1, c2, c3]) in self.coefficients[i].into_iter().enumerate() {
-            weights[0][m] = c0 + s * (c1 + s * (c2 + s * c3));
-            weights[1][m] = c1 + s * (2.0 * c2 + s * 3.0 * c3);
-            weights[2][m] = 2.0 * c2 + s * 6.0 * c3;
-        }
-        weights
-    }
-}
-
-impl Default for SwingBasis {
-    fn default() -> Self {
-        Self::new()
+    /// The weights and their first and second derivatives at u, which is clamped to [0, 1], by distinct control point.
+    pub fn at(&self, u: f64) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let (u, intervals) = (u.clamp(0.0, 1.0), self.coefficients.len());
+        let i = ((u * intervals as f64) as usize).min(intervals - 1);
+        let s = u - i as f64 / intervals as f64;
+        self.coefficients[i].iter().map(move |[c0, c1, c2, c3]| {
+            [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + s * 3.0 * c3), 2.0 * c2 + s * 6.0 * c3]
+        })
     }
 }
 
@@ -101,45 +134,55 @@ impl Default for SwingBasis {
 mod tests {
     use super::*;
 
+    const SHAPES: [SwingShape; 2] = [SwingShape::Light, SwingShape::Smooth];
+
     #[test]
     fn the_clamped_basis_sums_to_one_and_its_derivatives_match_differences() {
-        for i in 1..40 {
-            let u = f64::from(i) / 40.0 + 0.003;
-            let e = 1e-6;
-            let b = clamped_cubic(u);
-            let (p, m) = (clamped_cubic(u + e), clamped_cubic(u - e));
-            assert_eq!(b[0].len(), 7);
-            assert!((b[0].iter().sum::<f64>() - 1.0).abs() < 1e-13);
-            for k in 0..7 {
-                assert!(((p[0][k] - m[0][k]) / (2.0 * e) - b[1][k]).abs() < 1e-7, "u {u} k {k}");
-                assert!(((p[1][k] - m[1][k]) / (2.0 * e) - b[2][k]).abs() < 1e-6, "u {u} k {k}");
+        for shape in SHAPES {
+            let intervals = shape.intervals();
+            for i in 1..40 {
+                let u = f64::from(i) / 40.0 + 0.003;
+                let e = 1e-6;
+                let b = clamped_cubic(intervals, u);
+                let (p, m) = (clamped_cubic(intervals, u + e), clamped_cubic(intervals, u - e));
+                assert_eq!(b[0].len(), intervals + 3);
+                assert!((b[0].iter().sum::<f64>() - 1.0).abs() < 1e-13);
+                for k in 0..intervals + 3 {
+                    assert!(((p[0][k] - m[0][k]) / (2.0 * e) - b[1][k]).abs() < 1e-7, "u {u} k {k}");
+                    assert!(((p[1][k] - m[1][k]) / (2.0 * e) - b[2][k]).abs() < 1e-6, "u {u} k {k}");
+                }
             }
         }
     }
 
     #[test]
     fn the_polynomials_are_the_basis() {
-        let basis = SwingBasis::new();
-        for i in 0..=40 {
-            let u = f64::from(i) / 40.0;
-            let (found, expected) = (basis.at(u), swing_basis(u));
-            for derivative in 0..3 {
-                for m in 0..SWING_POINTS {
-                    let error = found[derivative][m] - expected[derivative][m];
-                    assert!(error.abs() < 1e-11, "u {u}, {derivative}, {m}");
+        for shape in SHAPES {
+            let basis = SwingBasis::new(shape);
+            for i in 0..=40 {
+                let u = f64::from(i) / 40.0;
+                let expected = swing_basis(shape, u);
+                for (m, found) in basis.at(u).enumerate() {
+                    for derivative in 0..3 {
+                        let error = found[derivative] - expected[derivative][m];
+                        assert!(error.abs() < 1e-10, "u {u}, {derivative}, {m}");
+                    }
                 }
             }
+            let first: Vec<f64> = basis.at(-0.3).map(|weights| weights[0]).collect();
+            assert_eq!((first[0], first.len()), (1.0, shape.points()));
         }
-        assert_eq!(basis.at(-0.3)[0], [1.0, 0.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]
-    fn a_clamped_spline_starts_and_ends_at_rest_if_its_outer_points_coincide() {
-        for (u, outer) in [(0.0, [0, 1]), (1.0, [5, 6])] {
-            let b = clamped_cubic(u);
-            let inner: f64 =
-                (0..7).filter(|k| !outer.contains(k)).map(|k| b[0][k].abs() + b[1][k].abs()).sum();
-            assert!(inner < 1e-14, "value and velocity depend on the outer two points alone");
+    fn a_swing_starts_and_ends_at_rest() {
+        for (shape, derivatives) in [(SwingShape::Light, 1..2), (SwingShape::Smooth, 1..3)] {
+            for u in [0.0, 1.0] {
+                let basis = swing_basis(shape, u);
+                for derivative in derivatives.clone() {
+                    assert!(basis[derivative].iter().all(|b| b.abs() < 1e-12), "{shape:?} {derivative}");
+                }
+            }
         }
     }
 }

@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use super::node::LinearNode;
 use super::phase::Swing;
-use super::spline::{SWING_POINTS, SwingBasis};
+use super::spline::SwingBasis;
 
 /// Greatest distance of a switch from its nominal time, s.
 const FARTHEST: f64 = 0.15;
@@ -181,10 +181,10 @@ impl TimedNode {
 
     /// A foot at time k in samples. `variables` are those of a swing's foothold, control points and next foothold; `lift_off` is the
     /// variable of the lift-off, followed by that of the touch-down.
-    pub fn moving(k: f64, variables: [usize; SWING_POINTS], lift_off: usize) -> Self {
+    pub fn moving(k: f64, variables: &[usize], lift_off: usize) -> Self {
         Self {
             node: LinearNode {
-                terms: variables.map(|v| (v, 0.0)).to_vec(),
+                terms: variables.iter().map(|v| (*v, 0.0)).collect(),
                 times: vec![(lift_off, [0.0; 3]), (lift_off + 1, [0.0; 3])],
             },
             mixed: vec![[0.0; 2]; variables.len()],
@@ -236,7 +236,6 @@ impl TimedNode {
         let [a, b] = [0, 1].map(|t| x[self.node.times[t].0]);
         let duration = b - a;
         let u = (k - a) / duration;
-        let weights = basis.at(u);
         // ∂u/∂(a, b) and ∂²u/∂(aa, ab, bb); zero where the foot stands.
         let moves = f64::from(u8::from(u > 0.0 && u < 1.0));
         let first = [(u - 1.0) / duration, -u / duration].map(|v| v * moves);
@@ -244,12 +243,12 @@ impl TimedNode {
         let second = [2.0 * (u - 1.0) * scale, (1.0 - 2.0 * u) * scale, 2.0 * u * scale];
         let mut slope = [0.0; 3];
         let mut bend = [0.0; 3];
-        for (m, term) in self.node.terms.iter_mut().enumerate() {
-            term.1 = weights[0][m];
-            self.mixed[m] = first.map(|by| weights[1][m] * by);
+        for ((term, mixed), weights) in self.node.terms.iter_mut().zip(&mut self.mixed).zip(basis.at(u)) {
+            term.1 = weights[0];
+            *mixed = first.map(|by| weights[1] * by);
             for d in 0..3 {
-                slope[d] += weights[1][m] * x[term.0 + d];
-                bend[d] += weights[2][m] * x[term.0 + d];
+                slope[d] += weights[1] * x[term.0 + d];
+                bend[d] += weights[2] * x[term.0 + d];
             }
         }
         let square = [first[0] * first[0], first[0] * first[1], first[1] * first[1]];

@@ -41,7 +41,7 @@ impl StanceVariables {
 pub struct SwingVariables {
     /// When the foot moves.
     pub swing: Swing,
-    /// The first of the nine variables of the inner control points.
+    /// The first variable of the free control points.
     pub control_points: usize,
     /// The variable of the lift-off, followed by that of the touch-down; none if they are given.
     pub switches: Option<usize>,
@@ -64,6 +64,19 @@ pub struct FootVariables {
 }
 
 impl FootVariables {
+    /// Moves all its variables by so many places.
+    pub(super) fn move_variables(&mut self, by: usize) {
+        for stance in &mut self.stances {
+            for node in std::iter::once(&mut stance.foothold).chain(&mut stance.forces) {
+                node.terms.iter_mut().for_each(|term| term.0 += by);
+            }
+        }
+        for swing in &mut self.swings {
+            swing.control_points += by;
+            swing.switches = swing.switches.map(|switch| switch + by);
+        }
+    }
+
     /// Replaces the switches of swing `j`, if they are variables, by their values at x, and scales the forces next to it accordingly.
     pub(super) fn freeze_swing(&mut self, j: usize, x: &[f64]) {
         let swing = &mut self.swings[j];

@@ -13,7 +13,7 @@ use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan};
 use warpgait::planner::{Host, Motion, Progress, Seconds, solve};
 use warpgait::robot::{Robot, RobotSpec};
 use warpgait::scenario::{Formulation, Scenario, load_text};
-use warpgait::trajectory::spline::swing_basis;
+use warpgait::trajectory::spline::{SwingShape, swing_basis};
 use warpgait::warp::{self, WarpMap};
 
 /// Never asks to stop, and builds the maps of continuations anew.
@@ -100,6 +100,7 @@ pub fn standing() -> Plan {
         foot_normal: per_foot([0.0, 0.0, 1.0]),
         foot_names: ["LF", "RF", "LH", "RH"].map(String::from).to_vec(),
         foot_adhesive: vec![false; 4],
+        legs: None,
         warped: None,
         phase_durations: vec![vec![1.0]; 4],
         splines: Vec::new(),
@@ -135,6 +136,8 @@ pub fn standing() -> Plan {
                 reach: robot.feet.iter().map(|foot| foot.reach).collect(),
                 torso: robot.torso,
                 foot_radius: robot.foot_radius(),
+                legs: Vec::new(),
+                nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
             },
             limits: None,
             solver: MetaSolver {
@@ -186,7 +189,7 @@ pub fn lifting(height: f64) -> Plan {
     let mut plan = standing();
     let quarter = MASS * GRAVITY / 4.0;
     // At the middle of a swing, the three control points between the footholds have this weight.
-    let lift = height / swing_basis(0.5)[0][1..4].iter().sum::<f64>();
+    let lift = height / swing_basis(SwingShape::Light, 0.5)[0][1..4].iter().sum::<f64>();
     for n in 0..plan.t.len() {
         // 1 on four feet, 0 on two; between the nodes of the forces, every tenth sample, linear.
         let share = |n: usize| {
@@ -201,8 +204,8 @@ pub fn lifting(height: f64) -> Plan {
         }
         if n > 50 && n < 150 {
             let duration = 0.5;
-            let [value, first, second] =
-                swing_basis((plan.t[n] - 0.25) / duration).map(|b| lift * b[1..4].iter().sum::<f64>());
+            let [value, first, second] = swing_basis(SwingShape::Light, (plan.t[n] - 0.25) / duration)
+                .map(|b| lift * b[1..4].iter().sum::<f64>());
             plan.foot_contact[4 * n] = false;
             plan.foot_position[4 * n][2] = value;
             plan.foot_velocity[4 * n][2] = first / duration;

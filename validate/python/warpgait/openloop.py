@@ -89,7 +89,8 @@ def centroidal_residual(plan: Plan) -> Array:
     """What the plan's own motion and forces leave of the laws of Newton and Euler, (N, 6); the first and last samples are zero.
 
     Σf + m g = m p̈ and Σ(pᵢ − p) × fᵢ = d/dt (R I Rᵀ ω). p̈ and ω are differences of the sampled *poses*, and forces on feet in the
-    air are left out, so the stored derivatives cannot hide an error.
+    air are left out, so the stored derivatives cannot hide an error. In a plan whose legs have mass, the angular momentum is that which
+    the plan states; `inverse_dynamics` computes it anew.
     """
     step = plan.t[1]
     force = plan.foot_force * plan.foot_contact[..., None]
@@ -97,11 +98,15 @@ def centroidal_residual(plan: Plan) -> Array:
     p = plan.base_position
     acceleration = (p[2:] - 2 * p[1:-1] + p[:-2]) / step**2
     residual[1:-1, :3] = force.sum(1)[1:-1] + plan.robot.mass * (plan.robot.gravity - acceleration)
+    torque = np.cross(plan.foot_position - p[:, None], force).sum(1)
+    if plan.angular_momentum is not None:
+        change = (plan.angular_momentum[2:] - plan.angular_momentum[:-2]) / (2 * step)
+        residual[1:-1, 3:] = (torque[:-2] + 2 * torque[1:-1] + torque[2:]) / 4 - change
+        return residual
     rotation = rotation_from_wxyz(plan.base_quaternion_wxyz)
     turn = rotations_between(rotation)
     middle = (Rotation.from_rotvec(turn / 2) * rotation[:-1]).as_matrix()
     momentum = np.einsum("nij,jk,nlk,nl->ni", middle, plan.robot.inertia, middle, turn / step)
-    torque = np.cross(plan.foot_position - p[:, None], force).sum(1)
     residual[1:-1, 3:] = torque[1:-1] - np.diff(momentum, axis=0) / step
     return residual
 
@@ -125,19 +130,25 @@ def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, 
 
 
 def joint_motion(plan: Plan, model: Any, qpos: Array) -> tuple[Array, Array]:
-    """Velocities and accelerations (N, nv) by central differences of positions (N, nq); zero at the ends, where there are none."""
+    """Velocities and accelerations (N, nv) by central differences of positions (N, nq); zero at the ends, where there are none.
+
+    An acceleration is the mean over the two steps beside the sample, weighted with a hat: accelerations have kinks at the samples of the
+    solver, and jump where legs are massless.
+    """
     N, step = len(plan.t), plan.t[1]
-    qvel, qacc = np.zeros((N, model.nv)), np.zeros((N, model.nv))
-    for k in range(1, N - 1):
-        mujoco.mj_differentiatePos(model, qvel[k], 2 * step, qpos[k - 1], qpos[k + 1])
-    qacc[2:-2] = (qvel[3:-1] - qvel[1:-3]) / (2 * step)
+    qvel, qacc, between = np.zeros((N, model.nv)), np.zeros((N, model.nv)), np.zeros((N - 1, model.nv))
+    for k in range(N - 1):
+        mujoco.mj_differentiatePos(model, between[k], step, qpos[k], qpos[k + 1])
+    qvel[1:-1] = (between[1:] + between[:-1]) / 2
+    qacc[1:-1] = np.diff(between, axis=0) / step
     return qvel, qacc
 
 
 def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: Array, qacc: Array) -> tuple[Array, Array]:
     """Wrench (N, 6) about the center of mass that the planned forces leave unexplained, and joint torques (N, E, 3).
 
-    Contacts and joint limits of `model` are switched off meanwhile. The two samples at each end, whose accelerations are unknown, are zero.
+    Forces are averaged with the same hat as the accelerations. Contacts and joint limits of `model` are switched off meanwhile. The
+    samples at the ends, whose accelerations are unknown, are zero.
     """
     data = mujoco.MjData(model)
     N = len(plan.t)
@@ -145,13 +156,15 @@ def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: 
     jacobian = np.zeros((3, model.nv))
     flags = model.opt.disableflags
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
-    for k in range(2, N - 2):
+    forces = plan.foot_force * plan.foot_contact[..., None]
+    forces[1:-1] = (forces[:-2] + 4 * forces[1:-1] + forces[2:]) / 6
+    for k in range(1, N - 1):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[k], qvel[k], qacc[k]
         mujoco.mj_inverse(model, data)
         generalized = data.qfrc_inverse.copy()
-        for e in np.flatnonzero(plan.foot_contact[k]):
+        for e in np.flatnonzero(forces[k].any(axis=-1)):
             mujoco.mj_jac(model, data, jacobian, None, plan.foot_position[k, e], index.body[e])
-            generalized -= jacobian.T @ plan.foot_force[k, e]
+            generalized -= jacobian.T @ forces[k, e]
         # The free joint's rows are a force in the world frame and a torque about the base's origin in the base frame.
         force = generalized[:3]
         arm = com_from_base(data, index)

@@ -50,6 +50,8 @@ _FLOATS: dict[str, tuple[str | int, ...]] = {
     "heightfield_origin": (2,),
     "heightfield_spacing": (2,),
 }
+# The same for members that only plans have whose legs have mass.
+_LEGS: dict[str, tuple[str | int, ...]] = {"center_of_mass_shift": ("N", 3), "angular_momentum": ("N", 3)}
 _BOOLS: dict[str, tuple[str | int, ...]] = {"foot_contact": ("N", "E"), "foot_adhesive": ("E",)}
 
 
@@ -101,6 +103,10 @@ class Plan:
     foot_normal: Array  # (N, E, 3) of the terrain under the foot
     foot_names: tuple[str, ...]  # E
     foot_adhesive: Bools  # (E,)
+    center_of_mass_shift: (
+        Array | None
+    )  # (N, 3) from where it is in the trunk at the nominal stance, base frame; None: massless legs
+    angular_momentum: Array | None  # (N, 3) of trunk and legs about the center of mass, world, kg m²/s; None: massless legs
     terrain: Heightfield
     terrain_raw: Heightfield | None  # before smoothing, where the input was a raster and the plan is for the smoothed ground
     robot: PlannedRobot
@@ -265,6 +271,8 @@ def read_plan(path: str | Path) -> Plan:
     check.sizes["E"] = len(names)
     values: dict[str, Any] = {m: check.floats(m, s) for m, s in _FLOATS.items()}
     values |= {m: check.bools(m, s) for m, s in _BOOLS.items()}
+    massive = any(m in check.arrays for m in _LEGS)
+    values |= {m: check.floats(m, s) if massive else None for m, s in _LEGS.items()}
 
     t = values["t"]
     if len(t) < 3 or abs(t[0]) > _START or t[-1] <= 0 or np.ptp(np.diff(t)) > _UNIFORM * t[-1] / (len(t) - 1):

@@ -1,0 +1,259 @@
+//! The whole robot along the plan: trunk and links of the legs, by inverse kinematics from the plan's base and feet.
+//!
+//! The base's position is the center of mass of all of them, so the trunk is where the legs leave it: its point that is the center of
+//! mass at the nominal stance is at p − R s. The shift s depends on the postures of the legs, and these on s.
+
+use super::vector::{
+    Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, sub, transposed, turn_between,
+};
+use crate::leg::LegSpec;
+use crate::plan::{MetaRobot, Plan};
+
+/// Joint angles are found when they put the foot this near to its place, m.
+const FOUND: f64 = 1e-9;
+/// Steps of Newton's method at most; one sample is near the one before it.
+const STEPS: usize = 30;
+/// Rounds for s, each of which leaves about an eighth of the error, and the change at which they end, m.
+const ROUNDS: usize = 20;
+const SETTLED: f64 = 1e-9;
+
+/// A joint and its link.
+struct Joint {
+    position: [f64; 3],
+    axis: [f64; 3],
+    mass: f64,
+    center: [f64; 3],
+    inertia: Turn,
+}
+
+struct Leg {
+    joints: Vec<Joint>,
+    foot: [f64; 3],
+    radius: f64,
+}
+
+/// A link in a posture: base frame, origin at the center of mass of the nominal stance.
+#[derive(Clone, Copy)]
+struct Placed {
+    mass: f64,
+    inertia: Turn,
+    center: [f64; 3],
+    turn: Turn,
+}
+
+/// A leg in a posture: base frame, origin at the center of mass of the nominal stance.
+struct PlacedLeg {
+    links: Vec<Placed>,
+    /// A point of each joint's axis, and its direction.
+    axes: Vec<([f64; 3], [f64; 3])>,
+    /// The center of the foot.
+    foot: [f64; 3],
+}
+
+/// The robot along a plan.
+pub(super) struct BodyMotion {
+    /// (N,) s, base frame, m.
+    pub shift: Vec<[f64; 3]>,
+    /// (N − 1,) the angular momentum about the center of mass halfway between samples, world frame, kg m²/s.
+    pub momentum: Vec<[f64; 3]>,
+}
+
+impl Leg {
+    fn new(spec: &LegSpec) -> Option<Self> {
+        let joints = spec.joints.iter().map(|joint| {
+            let [xx, yy, zz, xy, xz, yz] = joint.inertia;
+            Joint {
+                position: joint.position,
+                axis: scale(1.0 / norm(joint.axis), joint.axis),
+                mass: joint.mass,
+                center: joint.center,
+                inertia: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]],
+            }
+        });
+        Some(Self { joints: joints.collect(), foot: spec.foot?, radius: spec.foot_radius })
+    }
+
+    /// At the joint angles q.
+    fn place(&self, q: &[f64; 3]) -> PlacedLeg {
+        let mut turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut at = [0.0; 3];
+        let (mut links, mut axes) = (Vec::new(), Vec::new());
+        for (joint, angle) in self.joints.iter().zip(q) {
+            at = add(at, apply(&turn, joint.position));
+            axes.push((at, apply(&turn, joint.axis)));
+            turn = product(&turn, &rotation(scale(*angle, joint.axis)));
+            let center = add(at, apply(&turn, joint.center));
+            links.push(Placed { mass: joint.mass, inertia: joint.inertia, center, turn });
+        }
+        let foot = add(at, apply(&turn, self.foot));
+        PlacedLeg { links, axes, foot }
+    }
+
+    /// Newton's method from the angles q: whether they reach the center of the foot at `target`.
+    fn solve(&self, target: [f64; 3], q: &mut [f64; 3]) -> bool {
+        for _ in 0..STEPS {
+            let PlacedLeg { axes, foot, .. } = self.place(q);
+            let miss = sub(target, foot);
+            if norm(miss) < FOUND {
+                return true;
+            }
+            let columns: Vec<[f64; 3]> = axes.iter().map(|(at, axis)| cross(*axis, sub(foot, *at))).collect();
+            // Cramer's rule.
+            let determinant = dot(columns[0], cross(columns[1], columns[2]));
+            let step = [
+                dot(miss, cross(columns[1], columns[2])),
+                dot(columns[0], cross(miss, columns[2])),
+                dot(columns[0], cross(columns[1], miss)),
+            ]
+            .map(|part| part / determinant);
+            let most = step.iter().fold(1.0, |most: f64, s| most.max(s.abs() / 0.3));
+            *q = std::array::from_fn(|j| q[j] + step[j] / most);
+        }
+        false
+    }
+}
+
+/// Σ m c of links, kg m.
+fn moment(links: &[Placed]) -> [f64; 3] {
+    links.iter().fold([0.0; 3], |sum, link| add(sum, scale(link.mass, link.center)))
+}
+
+impl BodyMotion {
+    /// Along a plan, for the robot that it is judged by; none if the legs are massless, an error in words if the robot cannot be.
+    pub fn new(plan: &Plan, robot: &MetaRobot) -> Result<Option<Self>, String> {
+        if robot.legs.is_empty() {
+            return Ok(None);
+        }
+        let (feet, samples) = (plan.foot_names.len(), plan.t.len());
+        let legs: Option<Vec<Leg>> = robot.legs.iter().map(Leg::new).collect();
+        let Some(legs) = legs.filter(|legs| legs.len() == feet && robot.nominal.len() == feet) else {
+            return Err(
+                "meta.robot.legs: not one leg for each foot, each with its joints and its foot".into()
+            );
+        };
+        if legs.iter().any(|leg| leg.joints.len() != 3) {
+            return Err("meta.robot.legs: a leg has three joints".into());
+        }
+        let mut angles: Vec<[f64; 3]> = robot.legs.iter().map(|leg| leg.stance.unwrap_or_default()).collect();
+        let Some(trunk) = trunk(robot, &legs, &mut angles) else {
+            return Err(
+                "meta.robot.legs: do not stand at their nominal places, or weigh more than the robot".into(),
+            );
+        };
+        let centers = centers(plan, &legs);
+        let mut shift = vec![[0.0; 3]; samples];
+        let mut postures: Vec<Vec<Placed>> = Vec::with_capacity(samples);
+        let mut here = [0.0; 3];
+        for n in 0..samples {
+            let from_center = |e: usize| {
+                let world = sub(centers[n * feet + e], plan.base_position[n]);
+                rotate_back(plan.base_quaternion_wxyz[n], world)
+            };
+            let mut links = Vec::new();
+            let mut found = true;
+            for _ in 0..ROUNDS {
+                links = vec![trunk];
+                for (e, leg) in legs.iter().enumerate() {
+                    found &= leg.solve(add(from_center(e), here), &mut angles[e]);
+                    links.extend(leg.place(&angles[e]).links);
+                }
+                let next = scale(1.0 / robot.mass, moment(&links));
+                let change = norm(sub(next, here));
+                here = next;
+                if change < SETTLED {
+                    break;
+                }
+            }
+            if !found {
+                // Out of reach: no law that needs the posture holds.
+                (here, angles) =
+                    ([0.0; 3], robot.legs.iter().map(|leg| leg.stance.unwrap_or_default()).collect());
+            }
+            shift[n] = if found { here } else { [f64::NAN; 3] };
+            postures.push(links);
+        }
+        let turns: Vec<Turn> = plan.base_quaternion_wxyz.iter().map(|q| matrix(*q)).collect();
+        let step = plan.t[samples - 1] / (samples - 1) as f64;
+        let momentum = (1..samples)
+            .map(|n| {
+                let at = |n: usize, l: usize| apply(&turns[n], sub(postures[n][l].center, shift[n]));
+                (0..postures[n].len()).fold([0.0; 3], |sum, l| {
+                    let [a, b] = [at(n - 1, l), at(n, l)];
+                    let link = postures[n][l];
+                    let orbit = scale(0.5 * link.mass / step, cross(add(a, b), sub(b, a)));
+                    let [before, after] = [n - 1, n].map(|n| product(&turns[n], &postures[n][l].turn));
+                    let speed = scale(1.0 / step, turn_between(&before, &after));
+                    let spin =
+                        |turn: &Turn| apply(turn, apply(&link.inertia, apply(&transposed(turn), speed)));
+                    add(add(sum, orbit), scale(0.5, add(spin(&before), spin(&after))))
+                })
+            })
+            .collect();
+        Ok(Some(Self { shift, momentum }))
+    }
+}
+
+/// What the links leave of the robot's mass, center of mass and inertia at the nominal stance; leaves the angles of that stance behind.
+fn trunk(robot: &MetaRobot, legs: &[Leg], angles: &mut [[f64; 3]]) -> Option<Placed> {
+    let mut links = Vec::new();
+    for ((leg, nominal), q) in legs.iter().zip(&robot.nominal).zip(angles) {
+        if !leg.solve(add(*nominal, [0.0, 0.0, leg.radius]), q) {
+            return None;
+        }
+        links.extend(leg.place(q).links);
+    }
+    let mass = robot.mass - links.iter().map(|link| link.mass).sum::<f64>();
+    if mass <= 0.0 {
+        return None;
+    }
+    let center = scale(-1.0 / mass, moment(&links));
+    let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let trunk = Placed { mass, inertia: [[0.0; 3]; 3], center, turn: unit };
+    let mut inertia = robot.inertia;
+    for link in links.iter().chain([&trunk]) {
+        let c = link.center;
+        let own = product(&product(&link.turn, &link.inertia), &transposed(&link.turn));
+        for (i, row) in inertia.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                let diagonal = if i == j { dot(c, c) } else { 0.0 };
+                *entry -= own[i][j] + link.mass * (diagonal - c[i] * c[j]);
+            }
+        }
+    }
+    Some(Placed { inertia, ..trunk })
+}
+
+/// The centers of the feet: along the normal in stance; in swing, along a direction that turns smoothly from one normal to the next. (N·E,)
+fn centers(plan: &Plan, legs: &[Leg]) -> Vec<[f64; 3]> {
+    let (feet, samples) = (legs.len(), plan.t.len());
+    let mut centers = plan.foot_position.clone();
+    for (e, leg) in legs.iter().enumerate() {
+        let standing = |n: usize| plan.foot_contact[n * feet + e];
+        let normal = |n: usize| plan.foot_normal[n * feet + e];
+        for n in 0..samples {
+            let mut direction = normal(n);
+            if !standing(n) {
+                let before = (0..n).rev().find(|&n| standing(n));
+                let after = (n..samples).find(|&n| standing(n));
+                if let (Some(before), Some(after)) = (before, after) {
+                    let u = (n - before) as f64 / (after - before) as f64;
+                    let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+                    let between = add(scale(1.0 - s, normal(before)), scale(s, normal(after)));
+                    direction = scale(1.0 / norm(between), between);
+                }
+            }
+            let center = &mut centers[n * feet + e];
+            *center = add(*center, scale(leg.radius, direction));
+        }
+    }
+    centers
+}
+
+/// The rotation matrix of a unit quaternion.
+fn matrix([w, x, y, z]: [f64; 4]) -> Turn {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
