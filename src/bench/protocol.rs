@@ -310,6 +310,9 @@ impl Protocol<'_> {
             Some((BASE_KNOTS, n)) => (String::new(), format!("[discretization]\nbase_knots = {n}\n\n")),
             Some((key, value)) => (format!("{key} = {value:?}\n"), String::new()),
         };
+        // The paper's robot walks as it did when the paper was compared with, and plans may use all of the friction, as in the paper.
+        let gait = if self.robot == ROBOT { "[gait]\ncycle = 1.0\nduty = 0.75\n\n" } else { "" };
+        let contact = if motion.work == Work::Track { "" } else { "[contact]\nfriction_margin = 0.0\n\n" };
         let ([x, y], [u, v]) = (route.start, route.goal);
         format!(
             "# {name}, written by warpgait bench\n\
@@ -318,7 +321,7 @@ impl Protocol<'_> {
              [terrain]\nkind = \"{terrain}\"\nlevel = \"{level}\"\n{terrain_key}\
              extent = [-{HALF_EXTENT:?}, {HALF_EXTENT:?}, -{HALF_EXTENT:?}, {HALF_EXTENT:?}]\n\n\
              [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
-             {discretization}[solver]\nmax_iterations = 200\ntolerance = {TOLERANCE:e}\n\n\
+             {gait}{contact}{discretization}[solver]\nmax_iterations = 200\ntolerance = {TOLERANCE:e}\n\n\
              [map]\n",
             self.robot
         )

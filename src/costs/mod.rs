@@ -4,5 +4,6 @@
 
 pub mod base_acceleration;
 pub mod force_rate;
+pub mod force_size;
 pub mod posture;
 pub mod swing_acceleration;

@@ -33,6 +33,8 @@ pub struct Model {
     pub size: f64,
     /// S = ½ tr(I) 1 − I, kg m²: the second moment of the mass, ∫ρ x xᵀ.
     pub second_moment: Matrix3<f64>,
+    /// Height of the center of mass above the feet at rest, m.
+    pub standing_height: f64,
     /// By foot, base frame, m.
     pub nominal: Vec<Vector3<f64>>,
     /// By foot.
@@ -86,6 +88,7 @@ impl Model {
             mass: robot.mass,
             size: robot.size(),
             second_moment: Matrix3::identity() * (0.5 * inertia.trace()) - inertia,
+            standing_height: robot.standing_height(),
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),
             legs: robot.feet.iter().map(Foot::leg).collect(),

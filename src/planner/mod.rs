@@ -24,6 +24,7 @@ mod base_path;
 pub mod derivatives;
 mod foothold_search;
 mod footholds;
+mod friction_advice;
 pub mod guess;
 pub mod legs;
 pub mod motion;

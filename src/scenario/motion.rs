@@ -85,7 +85,7 @@ pub struct ContactSpec {
     /// Coefficient of friction ν.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub friction: f64,
-    /// Fraction of ν that the plan leaves to the controller: forces stay within (1 − margin) ν.
+    /// Fraction of ν that the plan leaves to the controller and to slippery spots: forces stay within (1 − margin) ν.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub friction_margin: f64,
     /// The form of the friction cone.
@@ -107,7 +107,7 @@ impl Default for ContactSpec {
     fn default() -> Self {
         Self {
             friction: 0.75,
-            friction_margin: 0.0,
+            friction_margin: 0.2,
             cone: Cone::Exact,
             footholds: None,
             on_known_ground: true,

@@ -11,6 +11,8 @@ use crate::{Error, Result};
 const STAND: f64 = 0.3;
 /// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
 const CYCLE: f64 = 1.0;
+/// Length of a walk's cycle, in the robot's own: in it, swings of a walk with its default duty factor last 0.21 of the robot's cycle.
+const WALK_CYCLE: f64 = 1.25;
 /// Below this duty factor, all feet of a trot, pace or bound are in the air at times. (A little less, because of rounding.)
 const LEAST_DUTY: f64 = 0.4999;
 /// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
@@ -32,7 +34,7 @@ impl Gait {
     /// If the gait does not fit the robot, the horizon or the time step, or its durations cannot be optimized.
     pub fn of(scenario: &Scenario, robot: &Robot) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
-        Self::new(scenario, &foot_names, robot.gait_cycle.unwrap_or(CYCLE))
+        Self::new(scenario, &foot_names, default_cycle(scenario.gait.kind, robot))
     }
 
     /// The same with shorter cycles: more steps, with swings that last as long. None if the gait has no cycle, if
@@ -48,7 +50,7 @@ impl Gait {
             return None;
         }
         let mut quicker = scenario.clone();
-        quicker.gait.cycle = Some(factor * robot.gait_cycle.unwrap_or(CYCLE));
+        quicker.gait.cycle = Some(factor * default_cycle(gait.kind, robot));
         quicker.gait.duty = Some(duty);
         Some(Self::of(&quicker, robot))
     }
@@ -118,9 +120,16 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
     Ok((offsets, default_duty(kind)))
 }
 
-/// The fraction of a cycle that a foot stands.
+/// The fraction of a cycle that a foot stands. Between the swings of a walk, all feet stand for a twelfth of the cycle, in which the
+/// base moves over the next three of them.
 fn default_duty(kind: GaitKind) -> f64 {
-    if kind == GaitKind::Walk { 0.75 } else { 0.6 }
+    if kind == GaitKind::Walk { 5.0 / 6.0 } else { 0.6 }
+}
+
+/// The length of a cycle, s.
+fn default_cycle(kind: GaitKind, robot: &Robot) -> f64 {
+    let cycle = robot.gait_cycle.unwrap_or(CYCLE);
+    if kind == GaitKind::Walk { WALK_CYCLE * cycle } else { cycle }
 }
 
 /// As many whole cycles as fit into the horizon with standing at both ends. The remaining time is divided between the ends.
@@ -217,7 +226,7 @@ mod tests {
                 assert_eq!(up, 0);
             }
         }
-        assert!(gait.swings.iter().all(|s| s.len() == 9 && s.iter().all(|s| s.end - s.start == 5.0)));
+        assert!(gait.swings.iter().all(|s| s.len() == 9 && s.iter().all(|s| s.end - s.start == 3.0)));
     }
 
     #[test]
