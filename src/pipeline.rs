@@ -117,9 +117,10 @@ impl Prepared {
         if steps.gait != usual {
             let [more, fewer] = [&steps.gait, &usual].map(|gait| gait.swings.iter().map(Vec::len).max());
             let _ = observer(&Event::Note(&format!(
-                "gait: {} steps of each foot instead of {}, for better footholds (gait.cycle sets it)",
+                "gait: {} steps of each foot instead of {}, for {} (gait.cycle sets it)",
                 more.unwrap_or(0),
-                fewer.unwrap_or(0)
+                fewer.unwrap_or(0),
+                if surfaces.have_edges() { "better footholds" } else { "the way to the goal" }
             )));
         }
         Ok(Self { steps, ground, surfaces })

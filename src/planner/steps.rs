@@ -1,7 +1,7 @@
 //! How many steps a motion takes over ground with edges, and where they are.
 
 use super::footholds::{Assignment, assign};
-use super::travel::ensure_within_range;
+use super::travel::{ensure_within_range, is_unhurried};
 use crate::Result;
 use crate::nlp::Model;
 use crate::robot::Robot;
@@ -10,10 +10,11 @@ use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Spaces};
 
-/// Lengths of a cycle that are tried besides the usual one, as fractions of it.
-const SHORTER_CYCLES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
 /// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
 const MORE_STEPS: f64 = 0.1;
+
+/// What it costs, the gait, and `[foot][stance]` the cells of the contact surface.
+type Footing = (f64, Gait, Vec<Vec<usize>>);
 
 /// When the feet step, and where.
 #[derive(Clone, Debug)]
@@ -25,44 +26,40 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// The steps of a scenario. Over ground with edges, a gait without a given cycle gets more steps where that makes the footholds
-    /// better, such as on a staircase with short treads.
+    /// The steps of a scenario. A gait without a given cycle gets more steps where the goal is too far for fewer, and over ground with
+    /// edges where that makes the footholds better, such as on a staircase with short treads.
     ///
     /// # Errors
     /// Those of the gait; for a goal out of range; and, if no number of steps will do, what is wrong with the usual number: which foot
     /// finds nothing to stand on, where and when.
     pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
-        let usual = Gait::of(scenario, robot)?;
-        let shorter: Vec<(f64, Gait)> = match surfaces.have_edges() {
-            true => SHORTER_CYCLES
-                .iter()
-                .map_while(|&factor| Some((factor, Gait::with_more_steps(scenario, robot, factor)?.ok()?)))
-                .collect(),
-            false => Vec::new(),
+        let gaits = Gait::choices(scenario, robot)?;
+        ensure_within_range(scenario, robot, &gaits)?;
+        let Some(contact) = &surfaces.contact else {
+            let unhurried = gaits.iter().position(|(_, gait)| is_unhurried(scenario, robot, gait));
+            let chosen = unhurried.unwrap_or(gaits.len() - 1);
+            return Ok(Self { gait: gaits[chosen].1.clone(), patches: Vec::new() });
         };
-        let possible: Vec<&Gait> =
-            std::iter::once(&usual).chain(shorter.iter().map(|(_, gait)| gait)).collect();
-        ensure_within_range(scenario, robot, &possible)?;
-        let Some(contact) = &surfaces.contact else { return Ok(Self { gait: usual, patches: Vec::new() }) };
         // In ambient space, so that all formulations get the same patches.
         let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
         // The cost of a step, the gait, and the cells.
-        let with = |gait: Gait| -> Result<(f64, Gait, Vec<Vec<usize>>)> {
+        let with = |gait: Gait| -> Result<Footing> {
             let model = Model::new(scenario, robot, &gait, surfaces.clone(), spaces.clone());
             let Assignment { cells, cost } = assign(scenario, &model, contact)?;
             let count = gait.swings.iter().map(Vec::len).sum::<usize>().max(1);
             Ok((cost / count as f64, gait, cells))
         };
-        let mut best = with(usual);
-        for (factor, gait) in shorter {
-            if let Ok((cost, gait, cells)) = with(gait) {
-                let cost = cost + MORE_STEPS * (1.0 - factor);
-                if best.as_ref().map_or(true, |(least, ..)| cost < *least) {
-                    best = Ok((cost, gait, cells));
-                }
-            }
-        }
-        let (_, gait, cells) = best?;
+        // That of the usual gait first: if none will do, its error is reported.
+        let mut tried = gaits.into_iter().map(|(factor, gait)| {
+            with(gait).map(|(cost, gait, cells)| (cost + MORE_STEPS * (1.0 - factor), gait, cells))
+        });
+        let usual = tried.next().expect("at least the usual gait");
+        let better = |best: Result<Footing>, next: Result<Footing>| match (&best, &next) {
+            (_, Err(_)) => best,
+            (Ok((least, ..)), Ok((cost, ..))) if cost >= least => best,
+            _ => next,
+        };
+        let (_, gait, cells) = tried.fold(usual, better)?;
         // Around each cell the largest rectangle in which the NLP may move the foothold.
         let patches = cells.iter().map(|cells| cells.iter().map(|cell| contact.patch(*cell)).collect());
         Ok(Self { gait, patches: patches.collect() })

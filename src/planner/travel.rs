@@ -9,6 +9,8 @@ use crate::{Error, Result};
 const ALLOWANCE: f64 = 1.2;
 /// What a stance carries the base with ease, as a fraction of the reach box's chord along the way.
 const WITH_EASE: f64 = 0.8;
+/// The same for a gait that needs no more steps.
+const UNHURRIED: f64 = 1.0;
 /// Horizons longer than this are not proposed, s.
 const LONGEST: f64 = 600.0;
 
@@ -16,14 +18,14 @@ const LONGEST: f64 = 600.0;
 ///
 /// # Errors
 /// [`Error::Key`], with a horizon that should do, if one is found.
-pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[&Gait]) -> Result<()> {
+pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[(f64, Gait)]) -> Result<()> {
     if scenario.gait.optimize_durations {
         return Ok(());
     }
     let [x, y] = way(scenario);
     let distance = x.hypot(y);
     let at_most = |foot: &Foot| 2.0 * ALLOWANCE * foot.reach.half_size[0].hypot(foot.reach.half_size[1]);
-    let most = gaits.iter().map(|gait| range(robot, gait, at_most)).fold(0.0, f64::max);
+    let most = gaits.iter().map(|(_, gait)| range(robot, gait, at_most)).fold(0.0, f64::max);
     if distance <= most {
         return Ok(());
     }
@@ -38,6 +40,20 @@ pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[&Gait]) 
     Err(Error::key("goal.position", what))
 }
 
+/// Whether the legs carry the base to the goal with steps not longer than the reach boxes.
+pub fn is_unhurried(scenario: &Scenario, robot: &Robot, gait: &Gait) -> bool {
+    let [x, y] = way(scenario);
+    scenario.gait.optimize_durations || carries(scenario, robot, gait, UNHURRIED) >= x.hypot(y)
+}
+
+/// How far a gait carries the base, m, if each stance carries it by a fraction of the reach box's chord along the way.
+fn carries(scenario: &Scenario, robot: &Robot, gait: &Gait, fraction: f64) -> f64 {
+    let [x, y] = way(scenario);
+    let (sin, cos) = (y.atan2(x) - scenario.start_yaw()).sin_cos();
+    let chord = |half: [f64; 3]| 2.0 * (half[0] / cos.abs()).min(half[1] / sin.abs());
+    range(robot, gait, |foot| fraction * chord(foot.reach.half_size))
+}
+
 /// From the start to the goal, m.
 fn way(scenario: &Scenario) -> [f64; 2] {
     [0, 1].map(|c| scenario.goal.position[c] - scenario.start.position[c])
@@ -45,15 +61,12 @@ fn way(scenario: &Scenario) -> [f64; 2] {
 
 /// The shortest horizon, in whole seconds, in which the scenario's gait covers a distance with ease.
 fn easy_horizon(scenario: &Scenario, robot: &Robot, distance: f64) -> Option<f64> {
-    let [x, y] = way(scenario);
-    let (sin, cos) = (y.atan2(x) - scenario.start_yaw()).sin_cos();
-    let chord = |half: [f64; 3]| 2.0 * (half[0] / cos.abs()).min(half[1] / sin.abs());
     let mut longer = scenario.clone();
     longer.horizon = scenario.horizon.ceil();
     while longer.horizon < LONGEST {
         longer.horizon += 1.0;
-        let gait = Gait::of(&longer, robot).ok()?;
-        if range(robot, &gait, |foot| WITH_EASE * chord(foot.reach.half_size)) >= distance {
+        let gaits = Gait::choices(&longer, robot).ok()?;
+        if gaits.iter().any(|(_, gait)| carries(&longer, robot, gait, WITH_EASE) >= distance) {
             return Some(longer.horizon);
         }
     }
@@ -103,8 +116,8 @@ mod tests {
 
     fn refusal(horizon: f64, goal: f64, gait: &str) -> Option<String> {
         let loaded = loaded(horizon, goal, gait);
-        let gait = Gait::of(&loaded.scenario, &loaded.robot).expect("a gait");
-        ensure_within_range(&loaded.scenario, &loaded.robot, &[&gait]).err().map(|e| e.to_string())
+        let gaits = Gait::choices(&loaded.scenario, &loaded.robot).expect("a gait");
+        ensure_within_range(&loaded.scenario, &loaded.robot, &gaits).err().map(|e| e.to_string())
     }
 
     #[test]

@@ -11,6 +11,8 @@ use crate::{Error, Result};
 const STAND: f64 = 0.3;
 /// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
 const CYCLE: f64 = 1.0;
+/// Lengths of a cycle that are tried besides the usual one, as fractions of it.
+const SHORTER_CYCLES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
 /// Length of a walk's cycle, in the robot's own: in it, swings of a walk with its default duty factor last 0.21 of the robot's cycle.
 const WALK_CYCLE: f64 = 1.25;
 /// Below this duty factor, all feet of a trot, pace or bound are in the air at times. (A little less, because of rounding.)
@@ -37,9 +39,24 @@ impl Gait {
         Self::new(scenario, &foot_names, default_cycle(scenario.gait.kind, robot))
     }
 
+    /// The gaits that a scenario allows, each with the length of its cycle as a fraction of the usual one: the usual one first, then
+    /// those with more steps.
+    ///
+    /// # Errors
+    /// Those of the usual one.
+    pub fn choices(scenario: &Scenario, robot: &Robot) -> Result<Vec<(f64, Self)>> {
+        let mut gaits = vec![(1.0, Self::of(scenario, robot)?)];
+        let shorter = SHORTER_CYCLES.iter();
+        gaits.extend(
+            shorter
+                .map_while(|&factor| Some((factor, Self::with_more_steps(scenario, robot, factor)?.ok()?))),
+        );
+        Ok(gaits)
+    }
+
     /// The same with shorter cycles: more steps, with swings that last as long. None if the gait has no cycle, if
     /// the scenario gives its length or the duty factor, or if feet would stand for less than half of it: a trot would begin to jump.
-    pub fn with_more_steps(scenario: &Scenario, robot: &Robot, factor: f64) -> Option<Result<Self>> {
+    fn with_more_steps(scenario: &Scenario, robot: &Robot, factor: f64) -> Option<Result<Self>> {
         let gait = &scenario.gait;
         let cyclic = !matches!(gait.kind, GaitKind::Stand | GaitKind::Custom);
         if !cyclic || gait.cycle.is_some() || gait.duty.is_some() {
