@@ -161,9 +161,9 @@ fn forces() {
             }
         }
     };
-    // The cone holds 0.75 · 0.25 m g.
-    assert_eq!(broken(standing(), squeeze(0.187)), [""; 0]);
-    assert_eq!(broken(standing(), squeeze(0.20)), ["friction"]);
+    // The cone holds 0.8 · 0.75 · 0.25 m g.
+    assert_eq!(broken(standing(), squeeze(0.149)), [""; 0]);
+    assert_eq!(broken(standing(), squeeze(0.16)), ["friction"]);
     // On a slope beyond the friction angle, vertical forces leave the cone of the true normal.
     assert!(failed(&on_slope(0.8)).contains(&"friction".to_owned()));
 

@@ -293,8 +293,8 @@ fn adhesive_feet_have_a_limit_of_shear() {
         let report = check(&plan).unwrap();
         report.rows.iter().filter(|row| !row.passed).map(|row| row.name.clone()).collect::<Vec<_>>()
     };
-    assert_eq!(pushed(0.75 * 0.75), [""; 0]);
-    assert_eq!(pushed(0.75 * 0.76), ["shear"]);
+    assert_eq!(pushed(0.6 * 0.75), [""; 0]);
+    assert_eq!(pushed(0.6 * 0.76), ["shear"]);
 }
 
 #[test]

@@ -12,6 +12,7 @@
 //! | `legs` | what the legs' own mass adds to the laws, from a motion |
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
+//! | `friction_margin` | the same, and what a smaller margin of friction would do |
 //! | [`stage`] | which stages there are |
 //! | `stopping` | when a stage has done what its effort demands |
 //! | `options` | the options given to Ipopt |
@@ -24,7 +25,7 @@ mod base_path;
 pub mod derivatives;
 mod foothold_search;
 mod footholds;
-mod friction_advice;
+mod friction_margin;
 pub mod guess;
 pub mod legs;
 pub mod motion;
@@ -40,9 +41,10 @@ mod threads;
 mod travel;
 pub mod violation;
 
+pub use friction_margin::solve;
 pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
-pub use solve::{Host, Progress, Task, solve};
+pub use solve::{Host, Progress, Task};
 pub use stage::Stage;
 pub use steps::Steps;

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::friction_advice;
 use super::guess;
 use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
@@ -99,16 +98,10 @@ pub trait Host {
 
 /// Plans a motion: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
 /// the terrain grows out of the plane in steps, each solved from the one before; over ground with edges, a second solve that leaves
-/// the joints to the end. If there is none that leaves `contact.friction_margin`, the status says whether a smaller margin would do.
+/// the joints to the end.
 ///
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
-pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
-    let motion = attempt(task, host)?;
-    friction_advice::advise(task, host, motion)
-}
-
-/// The same with the margin as it is given.
 pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
     let steps = match solver.continuation {

@@ -51,7 +51,7 @@ impl Default for GaitSpec {
             cycle: None,
             duty: None,
             optimize_durations: false,
-            duration_bounds: [0.1, 1.0],
+            duration_bounds: [0.1, 2.0],
             phases: None,
         }
     }

@@ -1,17 +1,23 @@
-//! When no motion is found: would one be, if the plan used more of the friction?
+//! A solve; and when no motion is found: would one be, if the plan used more of the friction?
 
 use super::motion::Motion;
 use super::solve::{Host, Task, attempt};
 use crate::Result;
 use crate::scenario::{Effort, Scenario};
 
+/// Plans a motion; if there is none that leaves `contact.friction_margin`, the status says whether a smaller margin would do.
+///
+/// # Errors
+/// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
+pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
+    let motion = attempt(task, host)?;
+    advise(task, host, motion)
+}
+
 /// Adds to the status of a motion that was not found with which smaller `contact.friction_margin` one is found, if there is one.
 ///
 /// Solves once more with no margin and, if that succeeds, with half of the margin; feasible points suffice.
-///
-/// # Errors
-/// Those of a solve.
-pub(super) fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
+fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
     let margin = task.scenario.contact.friction_margin;
     if motion.solved || motion.interrupted || margin == 0.0 {
         return Ok(motion);
