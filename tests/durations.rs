@@ -27,7 +27,9 @@ fn free_switches_give_better_motions_that_hold() {
     for terrain in TERRAINS {
         for formulation in ["warped", "direct", "hybrid"] {
             let text = |gait: &str| {
-                format!("formulation = \"{formulation}\"\nhorizon = 4.0\n[terrain]\n{terrain}[gait]\n{gait}")
+                format!(
+                    "formulation = \"{formulation}\"\nhorizon = 4.0\n[contact]\nfriction_margin = 0.0\n[terrain]\n{terrain}[gait]\n{gait}"
+                )
             };
             let (fixed, _) = solved(&text("cycle = 1.0\nduty = 0.75\n"));
             let (free, plan) = solved(&text(
