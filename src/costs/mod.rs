@@ -4,6 +4,6 @@
 
 pub mod base_acceleration;
 pub mod force_rate;
-pub mod force_size;
+pub mod force_share;
 pub mod posture;
 pub mod swing_acceleration;

@@ -18,7 +18,7 @@ use crate::constraints::stance::OnGround;
 use crate::constraints::swing::SwingClearance;
 use crate::costs::base_acceleration::BaseAcceleration;
 use crate::costs::force_rate::ForceRate;
-use crate::costs::force_size::ForceSize;
+use crate::costs::force_share::ForceShare;
 use crate::costs::posture::Posture;
 use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::{Multipliers, NlpProblem};
@@ -41,9 +41,9 @@ const SWING_WEIGHT: f64 = 1e-3;
 const SWING_WEIGHT_OVER_EDGES: f64 = 3e-2;
 /// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
 const POSTURE_WEIGHT: f64 = 100.0;
-/// Weight of the size of the forces, relative to that of their rate, in g over the standing height: the square of the rate at which a
-/// standing robot of that height falls over. Twice as much would make the base accelerate by 10 % more (docs/results.md).
-const FORCE_SIZE_WEIGHT: f64 = 0.5;
+/// Weight of how standing feet share the load, relative to that of the forces' rate, in g over the standing height: the square of
+/// the rate at which a standing robot of that height falls over.
+const FORCE_SHARE_WEIGHT: f64 = 0.5;
 
 /// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper: Eq. 1 in the direct formulation, Eq. 7 in the warped one.
 pub struct GaitProblem {
@@ -122,8 +122,8 @@ impl GaitProblem {
         }
         if choice.with_costs && force > 0.0 {
             costs.push(Box::new(ForceRate::new(&model, force)));
-            let size = FORCE_SIZE_WEIGHT * GRAVITY / model.standing_height;
-            costs.push(Box::new(ForceSize::new(&model, size * force)));
+            let share = FORCE_SHARE_WEIGHT * GRAVITY / model.standing_height;
+            costs.push(Box::new(ForceShare::new(&model, share * force)));
         }
         Self::compose(model, blocks, costs, initial, choice.exact_hessian)
     }
