@@ -18,6 +18,8 @@ const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const NO_WAY: f64 = 1e-9;
 /// Relative difference of numbers that are the same up to rounding.
 const ROUNDING: f64 = 1e-9;
+/// How far the violation in the history may be from that of the result, as a fraction of the tolerance.
+const RELAXED: f64 = 0.01;
 
 /// The robot that the scenario asks for: a shipped one, or, as a robot file is not part of a plan, that of the plan with the scenario's
 /// friction.
@@ -216,12 +218,15 @@ fn parts(s: &Subject, remarks: &mut Vec<String>) {
     ));
 }
 
-/// 0 if a row of the history has the violation of the result (which Ipopt sums in another order), its times increase up to the total, and it is as it was written; else
-/// more than that.
+/// 0 if a row of the history has the violation of the result, its times increase up to the total, and it is as it was written; else
+/// more than that. Ipopt sums the violation in another order, and measures from bounds that it relaxes a little.
 fn history(s: &Subject) -> f64 {
     let (plan, solver) = (s.plan, &s.plan.meta.solver);
-    let off =
-        |violation: &f64| (violation - solver.max_violation).abs() / (1e-12 + solver.max_violation.abs());
+    let allowed = RELAXED * s.scenario.solver.tolerance;
+    let off = |violation: &f64| {
+        let difference = (violation - solver.max_violation).abs();
+        (difference - allowed).max(0.0) / (1e-12 + solver.max_violation.abs())
+    };
     let nearest = plan.history_constraint_violation.iter().map(off);
     let nearest = nearest.reduce(|a, b| -larger(-a, -b)).unwrap_or(1.0);
     let times = &plan.history_seconds;

@@ -79,10 +79,12 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// SHA-256 (hexadecimal) of the history, as in `meta.solver`.
+    /// SHA-256 (hexadecimal) of the history and the largest violation, as in `meta.solver`.
     pub fn history_sha256(&self) -> String {
         let columns = [&self.history_objective, &self.history_constraint_violation, &self.history_seconds];
-        let bytes: Vec<u8> = columns.into_iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        let result = &self.meta.solver.max_violation;
+        let values = columns.into_iter().flatten().chain(std::iter::once(result));
+        let bytes: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
         sha256_hex(bytes)
     }
 }
@@ -242,8 +244,8 @@ pub struct MetaSolver {
     pub iterations: usize,
     /// Largest violation, units of the NLP.
     pub max_violation: f64,
-    /// SHA-256 (hexadecimal) of the elements of `history_objective`, `history_constraint_violation` and `history_seconds`, in this
-    /// order; none in plans of older versions.
+    /// SHA-256 (hexadecimal) of the elements of `history_objective`, `history_constraint_violation` and `history_seconds`, and of
+    /// `max_violation`, in this order; none in plans of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub history_sha256: Option<String>,
     /// What solved the systems of equations inside Ipopt: `faer` or `mumps`; no text in plans of versions that knew only MUMPS.
