@@ -28,10 +28,10 @@ pub enum GaitKind {
 pub struct GaitSpec {
     /// The pattern.
     pub kind: GaitKind,
-    /// Duration of a cycle, s; default: the robot's (anymal_c 1.2), or 1 if it has none; for a walk 1.25 times that.
+    /// Duration of a cycle, s; default: the robot's (anymal_c 1.2), or 1 if it has none; for a walk over smooth ground 1.25 times that.
     #[schemars(range(min = 0.1, max = 20.0))]
     pub cycle: Option<f64>,
-    /// Fraction of the cycle that a foot stands; default by kind: walk 5/6, others 0.6.
+    /// Fraction of the cycle that a foot stands; default: walk over smooth ground 5/6, over patches 0.75, others 0.6.
     #[schemars(range(min = 0.1, max = 1.0))]
     pub duty: Option<f64>,
     /// Whether the phase durations are variables.

@@ -4,7 +4,7 @@
 use super::phase::{Stance, Swing};
 use super::switches;
 use crate::robot::Robot;
-use crate::scenario::{GaitKind, Scenario};
+use crate::scenario::{Footholds, GaitKind, Scenario};
 use crate::{Error, Result};
 
 /// Least time of standing at the start and at the end, s, in which the base accelerates and stops.
@@ -13,8 +13,8 @@ const STAND: f64 = 0.3;
 const CYCLE: f64 = 1.0;
 /// Lengths of a cycle that are tried besides the usual one, as fractions of it.
 const SHORTER_CYCLES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
-/// Length of a walk's cycle, in the robot's own: in it, swings of a walk with its default duty factor last 0.21 of the robot's cycle.
-const WALK_CYCLE: f64 = 1.25;
+/// Length of the cycle of a walk over smooth ground, in the robot's own: swings last 0.21 of that, instead of 0.25 over patches.
+const SMOOTH_WALK_CYCLE: f64 = 1.25;
 /// Below this duty factor, all feet of a trot, pace or bound are in the air at times. (A little less, because of rounding.)
 const LEAST_DUTY: f64 = 0.4999;
 /// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
@@ -36,7 +36,7 @@ impl Gait {
     /// If the gait does not fit the robot, the horizon or the time step, or its durations cannot be optimized.
     pub fn of(scenario: &Scenario, robot: &Robot) -> Result<Self> {
         let foot_names: Vec<String> = robot.feet.iter().map(|f| f.name.clone()).collect();
-        Self::new(scenario, &foot_names, default_cycle(scenario.gait.kind, robot))
+        Self::new(scenario, &foot_names, default_cycle(scenario, robot))
     }
 
     /// The gaits that a scenario allows, each with the length of its cycle as a fraction of the usual one: the usual one first, then
@@ -62,12 +62,12 @@ impl Gait {
         if !cyclic || gait.cycle.is_some() || gait.duty.is_some() {
             return None;
         }
-        let duty = 1.0 - (1.0 - default_duty(gait.kind)) / factor;
+        let duty = 1.0 - (1.0 - default_duty(scenario)) / factor;
         if duty < LEAST_DUTY {
             return None;
         }
         let mut quicker = scenario.clone();
-        quicker.gait.cycle = Some(factor * default_cycle(gait.kind, robot));
+        quicker.gait.cycle = Some(factor * default_cycle(scenario, robot));
         quicker.gait.duty = Some(duty);
         Some(Self::of(&quicker, robot))
     }
@@ -86,8 +86,8 @@ impl Gait {
             GaitKind::Stand => vec![Vec::new(); feet],
             GaitKind::Custom => custom(gait.phases.as_deref(), feet, step, intervals)?,
             kind => {
-                let (offsets, duty) = pattern(kind, foot_names)?;
-                let duty = gait.duty.unwrap_or(duty);
+                let offsets = pattern(kind, foot_names)?;
+                let duty = gait.duty.unwrap_or(default_duty(scenario));
                 cyclic(&offsets, duty, gait.cycle.unwrap_or(cycle), scenario.horizon, step)?
             }
         };
@@ -112,8 +112,8 @@ impl Gait {
     }
 }
 
-/// The lift-off of each foot, as a fraction of the cycle, and the default duty factor.
-fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
+/// The lift-off of each foot, as a fraction of the cycle.
+fn pattern(kind: GaitKind, names: &[String]) -> Result<Vec<f64>> {
     let table: [f64; 4] = match kind {
         // One foot at a time: LH, LF, RH, RF.
         GaitKind::Walk => [0.25, 0.75, 0.0, 0.5],
@@ -123,7 +123,7 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
         GaitKind::Stand | GaitKind::Custom => unreachable!("handled by the caller"),
     };
     let order = ["LF", "RF", "LH", "RH"];
-    let offsets = names
+    names
         .iter()
         .map(|name| {
             order.iter().position(|o| o == name).map(|i| table[i]).ok_or_else(|| {
@@ -133,20 +133,29 @@ fn pattern(kind: GaitKind, names: &[String]) -> Result<(Vec<f64>, f64)> {
                 Error::key("gait.kind", what)
             })
         })
-        .collect::<Result<_>>()?;
-    Ok((offsets, default_duty(kind)))
+        .collect()
 }
 
-/// The fraction of a cycle that a foot stands. Between the swings of a walk, all feet stand for a twelfth of the cycle, in which the
-/// base moves over the next three of them.
-fn default_duty(kind: GaitKind) -> f64 {
-    if kind == GaitKind::Walk { 5.0 / 6.0 } else { 0.6 }
+/// Whether a gait is a walk over smooth ground, in which all feet stand between the swings for a twelfth of the cycle: the base then
+/// accelerates a third as much. Over patches, where the steps follow the ground, it would not, and swings would be quicker
+/// (docs/results.md).
+fn is_smooth_walk(scenario: &Scenario) -> bool {
+    scenario.gait.kind == GaitKind::Walk && scenario.footholds() == Footholds::Anywhere
+}
+
+/// The fraction of a cycle that a foot stands.
+fn default_duty(scenario: &Scenario) -> f64 {
+    match scenario.gait.kind {
+        GaitKind::Walk if is_smooth_walk(scenario) => 5.0 / 6.0,
+        GaitKind::Walk => 0.75,
+        _ => 0.6,
+    }
 }
 
 /// The length of a cycle, s.
-fn default_cycle(kind: GaitKind, robot: &Robot) -> f64 {
+fn default_cycle(scenario: &Scenario, robot: &Robot) -> f64 {
     let cycle = robot.gait_cycle.unwrap_or(CYCLE);
-    if kind == GaitKind::Walk { WALK_CYCLE * cycle } else { cycle }
+    if is_smooth_walk(scenario) { SMOOTH_WALK_CYCLE * cycle } else { cycle }
 }
 
 /// As many whole cycles as fit into the horizon with standing at both ends. The remaining time is divided between the ends.
