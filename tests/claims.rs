@@ -146,7 +146,7 @@ fn every_member_is_covered_by_a_law() {
         ripples("direct", "[gait]\noptimize_durations = true\n"),
         rubble(folder.path(), "direct", false, ""),
         rubble(folder.path(), "hybrid", false, ""),
-        ripples("hybrid", "").replace("anymal_towr", "anymal_c"),
+        ripples("hybrid", "[gait]\ncycle = 1.2\nduty = 0.75\n").replace("anymal_towr", "anymal_c"),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();
@@ -201,7 +201,8 @@ fn what_meta_states_is_what_the_scenario_asks_for() {
 }
 
 fn meta_states_what_the_scenario_asks_for(robot: &str) {
-    let (_, plan) = solved(&ripples("direct", "").replace("anymal_towr", robot));
+    let (_, plan) =
+        solved(&ripples("direct", "[gait]\ncycle = 1.2\nduty = 0.75\n").replace("anymal_towr", robot));
     let meta = serde_json::to_value(&plan.meta).unwrap();
     let mut keys = Vec::new();
     for part in ["robot", "limits", "sample_rate_hz", "schema"] {

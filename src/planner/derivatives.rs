@@ -20,10 +20,10 @@ pub struct DerivativeError {
 
 /// Step of the central differences.
 const STEP: f64 = 1e-5;
-/// Finer one for second derivatives, where the first cannot tell.
+/// Finer one, where the first cannot tell.
 const FINER_STEP: f64 = 1e-6;
-/// A second derivative that disagrees by more than this is compared with one-sided differences too: more than the step's own
-/// error, less than any test allows.
+/// A derivative that disagrees by more than this is compared with finer differences too, a second one also with one-sided ones:
+/// more than the step's own error, less than any test allows.
 const SUSPICIOUS: f64 = 1e-7;
 /// A difference larger than this, where the pattern has no entry, is a missing entry.
 const NOISE: f64 = 1e-6;
@@ -74,26 +74,35 @@ pub fn check_with(
                 column[r as usize] = Some(values[slot]);
             }
         }
-        moved[v] = x[v] + STEP;
-        problem.constraints(&moved, true, &mut plus);
-        let up = problem.objective(&moved, false);
-        moved[v] = x[v] - STEP;
-        problem.constraints(&moved, true, &mut minus);
-        let down = problem.objective(&moved, false);
-        moved[v] = x[v];
         let name = problem.variable_name(v);
+        let mut nearest = vec![f64::INFINITY; m];
+        let mut slope = f64::INFINITY;
+        for step in [STEP, FINER_STEP] {
+            moved[v] = x[v] + step;
+            problem.constraints(&moved, true, &mut plus);
+            let up = problem.objective(&moved, false);
+            moved[v] = x[v] - step;
+            problem.constraints(&moved, true, &mut minus);
+            let down = problem.objective(&moved, false);
+            if slope.is_infinite() {
+                slope = (up - down) / (2.0 * step);
+            }
+            if !approach(&column, &mut nearest, |row| (plus[row] - minus[row]) / (2.0 * step)) {
+                break;
+            }
+        }
+        moved[v] = x[v];
         for row in 0..m {
-            let difference = (plus[row] - minus[row]) / (2.0 * STEP);
             let b = block_of(row);
             match column[row] {
                 Some(value) => {
-                    note(&mut errors[b], value, difference, || format!("row {}, {name}", row - names[b].1))
+                    note(&mut errors[b], value, nearest[row], || format!("row {}, {name}", row - names[b].1))
                 }
-                None if difference.abs() > NOISE => errors[b].missing += 1,
+                None if nearest[row].abs() > NOISE => errors[b].missing += 1,
                 None => {}
             }
         }
-        note(&mut errors[cost], gradient[v], (up - down) / (2.0 * STEP), || name.clone());
+        note(&mut errors[cost], gradient[v], slope, || name.clone());
     }
     if problem.hessian_structure().is_some() {
         errors.push(check_hessian(problem, x, variables, tamper_hessian));
@@ -105,8 +114,8 @@ pub fn check_with(
 ///
 /// Third derivatives of the ground and of the map are in it, and they jump by J at knots: if one is at a distance d < step, the central
 /// difference is off by J/2 (1 − d/step), and a smaller step only makes that rarer. The one-sided difference away from the knot
-/// is not affected. So where the central one disagrees, both one-sided ones are taken as well, and the nearest counts; a wrong
-/// derivative disagrees with all three.
+/// is not affected. So where the central one disagrees, both one-sided ones and one of fourth order are taken as well, and the nearest
+/// counts; a wrong derivative disagrees with all of them.
 fn check_hessian(
     problem: &mut GaitProblem,
     x: &[f64],
@@ -163,6 +172,9 @@ fn check_hessian(
             let (here, beyond) = (at(0.0), [-2.0 * step, 2.0 * step].map(&mut at));
             let before = |u: usize| (3.0 * here[u] - 4.0 * minus[u] + beyond[0][u]) / (2.0 * step);
             let after = |u: usize| (4.0 * plus[u] - beyond[1][u] - 3.0 * here[u]) / (2.0 * step);
+            let finer =
+                |u: usize| (8.0 * (plus[u] - minus[u]) - (beyond[1][u] - beyond[0][u])) / (12.0 * step);
+            approach(&column, &mut nearest, finer);
             approach(&column, &mut nearest, before);
             if !approach(&column, &mut nearest, after) {
                 break;
