@@ -22,12 +22,6 @@ const TERRAINS: [(&str, &str); 5] = [
     ("formula", "kind = \"formula\"\nexpression = \"0.1*sin(2*x)*cos(1.5*y) + 0.05*x*y\""),
 ];
 
-/// For robots whose legs are known: on the hill of medium height, the guess lifts a foot beside its hip, where angles have no derivatives.
-fn terrains_for_legs() -> [(&'static str, &'static str); 5] {
-    TERRAINS
-        .map(|(name, text)| (name, if name == "hilly" { "kind = \"hilly\"\nlevel = \"easy\"" } else { text }))
-}
-
 /// A short motion over a terrain, with everything that can be switched on.
 fn problem(terrain: &str, formulation: &str, extra: &str) -> GaitProblem {
     problem_of("anymal_towr", terrain, formulation, extra)
@@ -124,7 +118,7 @@ fn durations_match_differences_wherever_the_switches_are() {
     // With known legs: their speeds and torques follow the switches too.
     for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
-            for (name, terrain) in terrains_for_legs() {
+            for (name, terrain) in TERRAINS {
                 check(
                     problem_of(robot, terrain, formulation, gait),
                     &format!("{robot}, {name}, {formulation}"),
@@ -218,7 +212,7 @@ fn coarse_knots_and_newton_euler_match_differences() {
 fn blocks_of_known_legs_match_differences_on_all_terrains() {
     for formulation in ["warped", "direct", "hybrid"] {
         for robot in ["anymal_b", "anymal_c"] {
-            for (terrain, text) in terrains_for_legs() {
+            for (terrain, text) in TERRAINS {
                 let problem = problem_of(robot, text, formulation, "");
                 has_leg_terms(&problem);
                 for name in ["joint speed", "joint torque", "knee clearance"] {
