@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Callable
 
+from .errors import InputError
 from .text import visible
 
-ERROR = 2  # exit code
+ERROR, INTERRUPTED = 2, 130  # exit codes
 
 
 class OutputError(Exception):
@@ -34,6 +36,20 @@ def complain(text: object) -> None:
 def _discard() -> None:
     """From now on, nothing more goes to standard output, not even what is buffered."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def answer(name: str, as_json: bool, work: Callable[[], int]) -> int:
+    """The exit code of a command's work. Bad input is one line, with `--json` an object as well; Ctrl-C is said and ends the command."""
+    try:
+        return work()
+    except (InputError, OSError) as error:
+        complain(error)
+        if as_json:
+            emit(json.dumps({"error": visible(error)}))
+        return ERROR
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 def run(main: Callable[[], int]) -> int:

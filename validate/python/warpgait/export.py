@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .console import ERROR, complain, emit, run
+from .console import answer, emit, run
 from .errors import InputError
 from .files import ensure_outputs, stem_of
 from .settings import without_opengl
@@ -20,7 +19,6 @@ from .text import visible
 if TYPE_CHECKING:
     from .motions import Format, Motion
 
-INTERRUPTED = 130  # exit code
 _GROUND = ".ground.npz"
 
 
@@ -125,29 +123,24 @@ def _told(outputs: list[Path], motion: Motion) -> str:
     return "\n".join(visible(line) for line in [*lines, *map(str, outputs)])
 
 
+def _main(options: argparse.Namespace) -> int:
+    if options.list:
+        emit(_list())
+        return 0
+    if options.plan is None:
+        raise InputError("the plan is missing: warpgait export NAME.plan.npz --to FORMAT")
+    outputs, motion = export(options.plan, chosen(options.to), options.output, options.source, options.rate)
+    if options.json:
+        emit(json.dumps({"written": [str(path) for path in outputs], **motion.facts}, allow_nan=False))
+    elif not options.quiet:
+        emit(_told(outputs, motion))
+    return 0
+
+
 def main(words: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     options = _parser().parse_args(words)
-    try:
-        if options.list:
-            emit(_list())
-            return 0
-        if options.plan is None:
-            raise InputError("the plan is missing: warpgait export NAME.plan.npz --to FORMAT")
-        outputs, motion = export(options.plan, chosen(options.to), options.output, options.source, options.rate)
-        if options.json:
-            emit(json.dumps({"written": [str(path) for path in outputs], **motion.facts}, allow_nan=False))
-        elif not options.quiet:
-            emit(_told(outputs, motion))
-        return 0
-    except (InputError, OSError) as error:
-        complain(error)
-        if options.json:
-            emit(json.dumps({"error": visible(error)}))
-        return ERROR
-    except KeyboardInterrupt:
-        print("export: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    return answer("export", options.json, lambda: _main(options))
 
 
 if __name__ == "__main__":

@@ -13,13 +13,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from .console import ERROR, complain, emit, run
+from .console import INTERRUPTED, answer, emit, run
 from .errors import InputError
 from .files import ensure_outputs
 from .sweeps import pool, results, spec
 from .text import visible
 
-INTERRUPTED = 130  # exit code
 _MOST_WORKERS = 1024
 
 
@@ -112,15 +111,7 @@ def _main(options: argparse.Namespace) -> int:
 def main(words: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     options = _parser().parse_args(words)
-    try:
-        return _main(options)
-    except (InputError, OSError) as error:
-        complain(error)
-        if options.json:
-            emit(json.dumps({"error": visible(error)}))
-        return ERROR
-    except KeyboardInterrupt:
-        return INTERRUPTED
+    return answer("sweep", options.json, lambda: _main(options))
 
 
 if __name__ == "__main__":

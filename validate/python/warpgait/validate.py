@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .console import ERROR, OutputError, complain, emit, run
+from .console import ERROR, INTERRUPTED, OutputError, complain, emit, run
 from .errors import InputError, error_page, error_report
 from .files import ensure_outputs, stem_of, write_text
 from .settings import MUJOCO_VERSION, Disturbance, Settings, without_opengl
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # MuJoCo and daqp are imported late, so that a missing package gives a message instead of a traceback.
 
 REPORTS = ".report.json", ".report.html"  # endings
-TRACKABLE, NOT_TRACKABLE, INTERRUPTED = 0, 1, 130  # exit codes; 2 is `ERROR`
+TRACKABLE, NOT_TRACKABLE = 0, 1  # exit codes, besides those of `console`
 UNFINISHED = "the replay has not finished"
 
 

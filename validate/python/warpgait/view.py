@@ -12,13 +12,12 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from .console import ERROR, complain, emit, run
+from .console import answer, emit, run
 from .errors import InputError
 from .files import ensure_outputs, stem_of, write_text
 from .settings import without_opengl
 from .text import visible
 
-INTERRUPTED = 130  # exit code
 _DISPLAYS = "DISPLAY", "WAYLAND_DISPLAY"  # without one of them, there is no browser to open on Linux
 
 
@@ -67,28 +66,23 @@ def opened(page: Path) -> bool:
         return False
 
 
+def _main(options: argparse.Namespace) -> int:
+    target = options.html or options.plan.with_name(f"{stem_of(options.plan)}.view.html")
+    write_page(options.plan, target)
+    shown = options.html is None and opened(target)
+    if options.json:
+        emit(json.dumps({"written": str(target), "opened": shown}))
+    elif not options.quiet:
+        emit(visible(target))
+        if options.html is None and not shown:
+            print("view: there is no browser to open it with; open this file in one", file=sys.stderr)
+    return 0
+
+
 def main(words: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     options = _parser().parse_args(words)
-    target = options.html or options.plan.with_name(f"{stem_of(options.plan)}.view.html")
-    try:
-        write_page(options.plan, target)
-        shown = options.html is None and opened(target)
-        if options.json:
-            emit(json.dumps({"written": str(target), "opened": shown}))
-        elif not options.quiet:
-            emit(visible(target))
-            if options.html is None and not shown:
-                print("view: there is no browser to open it with; open this file in one", file=sys.stderr)
-        return 0
-    except (InputError, OSError) as error:
-        complain(error)
-        if options.json:
-            emit(json.dumps({"error": visible(error)}))
-        return ERROR
-    except KeyboardInterrupt:
-        print("view: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    return answer("view", options.json, lambda: _main(options))
 
 
 if __name__ == "__main__":
