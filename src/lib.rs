@@ -59,6 +59,7 @@
 //! | [`bench`](mod@bench) | the paper's protocol | its tables and figures, and speed |
 //! | [`replay`] | a report of the Python package | its verdict |
 //! | [`cli`] | arguments | exit codes |
+//! | [`program`] | | how the program is run once more |
 //! | [`files`], [`digest`] | | files read within bounds, and written whole or not at all; `.npz` archives, SHA-256 |
 //!
 //! # Notation
@@ -97,6 +98,7 @@ pub mod nlp;
 pub mod pipeline;
 pub mod plan;
 pub mod planner;
+pub mod program;
 pub mod replay;
 pub mod report;
 pub mod robot;

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Result};
+use crate::{Error, Result, program};
 
 /// Prints "found" when Python finds the package, without importing it, which would take a second.
 const HAS_PACKAGE: &str = "import importlib.util, sys; \
@@ -21,8 +21,8 @@ const OF_REPOSITORY: &str = "validate/pyproject.toml";
 /// The folder that this program was compiled in.
 const COMPILED_IN: &str = env!("CARGO_MANIFEST_DIR");
 
-/// A Python that has the package: `$WARPGAIT_PYTHON`, or else that of `.venv` in the program's repository, or else `python3`. What lies in
-/// the working folder is neither run nor imported.
+/// A Python that has the package: `$WARPGAIT_PYTHON`, or else the one that this program was loaded into, that of `.venv` in the program's
+/// repository, or `python3`. What lies in the working folder is neither run nor imported.
 ///
 /// # Errors
 /// When none has it; the message tells how to install it.
@@ -37,11 +37,14 @@ pub fn python() -> Result<PathBuf> {
             Err(Error::input(format!("{PYTHON_VARIABLE}={}: {what}", named.display())))
         };
     }
+    if let Some(host) = program::host() {
+        return Ok(host.to_owned());
+    }
     candidates().into_iter().find(|python| has_package(python)).ok_or_else(|| {
         Error::input(format!(
             "this needs the Python package `warpgait`, which neither .venv in the program's repository nor python3 has; \
-             run scripts/setup --python in the folder of the repository, or pip install ./validate in an environment of yours \
-             and name its Python: {PYTHON_VARIABLE}=.venv/bin/python",
+             run scripts/setup --python in the folder of the repository, or pip install warpgait in an environment of yours \
+             and use its command, or name its Python: {PYTHON_VARIABLE}=.venv/bin/python",
         ))
     })
 }

@@ -92,6 +92,22 @@ fn init_writes_a_scenario_once() {
 }
 
 #[test]
+fn init_writes_examples_with_their_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, _) = warpgait(folder.path(), &["init", "--list"]);
+    assert_eq!(code, 0);
+    assert!(out.lines().any(|line| line.starts_with("stairs ") && line.contains("15 cm")), "{out}");
+    let (code, out, _) = warpgait(folder.path(), &["init", "--example", "stairs"]);
+    assert_eq!((code, out.trim()), (0, "stairs.toml"));
+    assert!(folder.path().join("stairs.png").is_file());
+    let (code, ..) = warpgait(folder.path(), &["terrain", "show", "stairs.toml"]);
+    assert_eq!(code, 0);
+    refused(folder.path(), &["init", "mine", "--example", "stairs"], &["stairs.png", "--force"]);
+    assert!(!folder.path().join("mine.toml").exists());
+    refused(folder.path(), &["init", "--example", "sea"], &["sea", "stepping_stones"]);
+}
+
+#[test]
 fn schema_is_json() {
     let folder = tempfile::tempdir().unwrap();
     let (code, out, _) = warpgait(folder.path(), &["schema"]);

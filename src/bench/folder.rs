@@ -11,7 +11,7 @@
 //! A finished case holds the SHA-256 of its scenario and of the program; when either differs, the case is computed again.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use super::process::{failure, wait};
 use crate::digest::sha256_hex;
 use crate::files::{self, MAX_FILE, open_for_process, write_atomically};
 use crate::replay::{self, Tracked};
-use crate::{Error, Result};
+use crate::{Error, Result, program};
 
 /// Digits of the program's SHA-256 that name the folder of its maps.
 const DIGEST_DIGITS: usize = 16;
@@ -42,7 +42,6 @@ pub(super) struct ResultsFolder {
     cases: PathBuf,
     plans: PathBuf,
     maps: PathBuf,
-    program: PathBuf,
     /// SHA-256 of the program.
     digest: String,
     /// A Python that has the replay's package; none where nothing is replayed.
@@ -55,14 +54,13 @@ impl ResultsFolder {
     /// # Errors
     /// When it cannot be written, or the program cannot be read.
     pub fn new(out: &Path, python: Option<PathBuf>) -> Result<Self> {
-        let program = std::env::current_exe().map_err(|e| Error::io("the running program", e))?;
+        let program = program::file().map_err(|e| Error::io("the running program", e))?;
         let digest = sha256_hex(&std::fs::read(&program).map_err(|e| Error::io(&program, e))?);
         let folder = Self {
             cases: out.join("cases"),
             plans: out.join("plans"),
             // A map cached by another build would hide how long this one takes.
             maps: out.join("maps").join(&digest[..DIGEST_DIGITS]),
-            program,
             digest,
             python,
         };
@@ -105,7 +103,7 @@ impl ResultsFolder {
         write_atomically(&scenario, case.scenario.as_bytes()).map_err(|e| e.to_string())?;
         // A result left by an earlier attempt must not pass for this one's.
         let _ = std::fs::remove_file(&result);
-        let mut command = Command::new(&self.program);
+        let mut command = program::command().map_err(|e| format!("failed: {e}"))?;
         command
             .args(["bench-case", "--parent", &std::process::id().to_string(), case.work.name()])
             .args([&scenario, &self.plan(case), &result])

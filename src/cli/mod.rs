@@ -22,7 +22,8 @@ mod terrain;
 mod validate;
 mod view;
 
-use std::io::ErrorKind;
+use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -94,8 +95,20 @@ enum Command {
 
 /// Runs the program with the arguments of the process.
 pub fn run() -> ExitCode {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// Runs the program with these arguments, the first of which is its name; returns the exit code. Everything is written when it returns.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let code = parse_and_run(arguments);
+    // A program in another language ends without this.
+    let _ = std::io::stdout().flush();
+    code
+}
+
+fn parse_and_run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     ipopt::keep_freed_memory();
-    let arguments = match Arguments::try_parse() {
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are not errors; neither is a closed pipe.
@@ -107,7 +120,7 @@ pub fn run() -> ExitCode {
                 eprintln!("error: standard output: {error}");
             }
             let good = printed.is_ok() && !error.use_stderr();
-            return ExitCode::from(if good { Ending::Good.code() } else { ERROR_CODE });
+            return if good { Ending::Good.code() } else { ERROR_CODE };
         }
     };
     let console = Console::new(arguments.json || arguments.command.has_json(), arguments.quiet);
@@ -116,11 +129,11 @@ pub fn run() -> ExitCode {
             if ending == Ending::Interrupted {
                 console.note("interrupted");
             }
-            ExitCode::from(ending.code())
+            ending.code()
         }
         Err(error) => {
             console.error(&error);
-            ExitCode::from(ERROR_CODE)
+            ERROR_CODE
         }
     }
 }

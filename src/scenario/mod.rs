@@ -4,6 +4,7 @@
 //! JSON Schema and most error messages are derived from them. `consistency.rs` refuses values that do not fit together.
 
 mod consistency;
+pub mod examples;
 mod format;
 mod gait;
 mod load;

@@ -1,10 +1,11 @@
-//! The native side of the Python package `warpgait`: plans evaluated exactly, the terrain, and solving.
+//! The native side of the Python package `warpgait`: plans evaluated exactly, the terrain, solving, and the command line.
 //!
 //! The documentation of each function, with shapes and units, stands here, where `help` finds it, and in `python/warpgait/_native.pyi`,
 //! where editors find it. A test compares the two. Every array is new and in C order. The interpreter lock is released during computation.
 
 mod arrays;
 mod check;
+mod command;
 mod error;
 mod solve;
 mod terrain;
@@ -15,6 +16,8 @@ mod trajectory;
 mod _native {
     #[pymodule_export]
     use super::check::check_plan;
+    #[pymodule_export]
+    use super::command::run_command;
     #[pymodule_export]
     use super::solve::solve;
     #[pymodule_export]

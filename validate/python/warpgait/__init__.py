@@ -2,17 +2,38 @@
 
 A `Scenario` says what is to be planned, on a `Ground`, by a `Robot`. `solve` plans it and `load` reads a plan; both return a `Plan`, which is
 exact at any time, and which can be checked, replayed, exported and looked at. `write_terrain` writes an array as a ground for scenarios.
-`python -m warpgait.validate`, `.export` and `.view` are commands.
+`python -m warpgait` is the command `warpgait`.
 """
 
-from ._native import BaseMotion, FeetMotion, Terrain
-from .errors import InputError
-from .ground import write_terrain
-from .plans import Check, Plan, Report, check, load, solve
-from .scenario import Ground, Robot, Scenario
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-Trajectory = Plan
-"""The name of `Plan` in version 0.1."""
+if TYPE_CHECKING:
+    from ._native import BaseMotion, FeetMotion, Terrain
+    from .errors import InputError
+    from .ground import write_terrain
+    from .plans import Check, Plan, Report, check, load, solve
+    from .plans import Plan as Trajectory
+    from .scenario import Ground, Robot, Scenario
+
+_PLACES = {
+    "BaseMotion": "_native",
+    "Check": "plans",
+    "FeetMotion": "_native",
+    "Ground": "scenario",
+    "InputError": "errors",
+    "Plan": "plans",
+    "Report": "plans",
+    "Robot": "scenario",
+    "Scenario": "scenario",
+    "Terrain": "_native",
+    "Trajectory": "plans",
+    "check": "plans",
+    "load": "plans",
+    "solve": "plans",
+    "write_terrain": "ground",
+}
+"""The module of each name. They are imported when first used: SciPy takes half a second, which `warpgait --help` need not wait for."""
 
 __all__ = [
     "BaseMotion",
@@ -31,3 +52,15 @@ __all__ = [
     "solve",
     "write_terrain",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f".{_PLACES[name]}", __name__), "Plan" if name == "Trajectory" else name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

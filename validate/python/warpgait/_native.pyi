@@ -136,6 +136,13 @@ def check_plan(path: str | PathLike[str]) -> str:
 def load(path: str | PathLike[str]) -> Trajectory:
     """Read a plan file. A damaged file, or one without splines, is refused with file, member and reason."""
 
+def run_command(arguments: list[str], python: str | PathLike[str], file: str | PathLike[str]) -> int:
+    """Run the command line with these arguments, the first of which is its name; returns the exit code.
+
+    It writes to the standard output and error of the process, not to `sys.stdout`, and handles Ctrl-C itself. Processes of its own are run
+    with the interpreter `python`; `file` is the compiled module.
+    """
+
 def solve(
     scenario: str | PathLike[str],
     *,

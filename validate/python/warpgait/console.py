@@ -52,13 +52,18 @@ def answer(name: str, as_json: bool, work: Callable[[], int]) -> int:
         return INTERRUPTED
 
 
-def run(main: Callable[[], int]) -> int:
-    """Run a command; returns its exit code, or 2 if its output cannot be written."""
+def keep_standard_streams() -> None:
+    """See to it that no file takes the place of a standard stream that is closed."""
     for descriptor in (0, 1, 2):
         try:
             os.fstat(descriptor)
-        except OSError:  # closed: no file may take its place
+        except OSError:
             os.open(os.devnull, os.O_RDWR)
+
+
+def run(main: Callable[[], int]) -> int:
+    """Run a command; returns its exit code, or 2 if its output cannot be written."""
+    keep_standard_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
