@@ -135,6 +135,10 @@ fn ripples(formulation: &str, more: &str) -> String {
     )
 }
 
+/// One that is passed, and one that is met at its time.
+const WAYPOINTS: &str = "[[goal.waypoints]]\nposition = [0.0, 0.1]\n\
+    [[goal.waypoints]]\nposition = [0.15, 0.1]\ntime = 1.5\nyaw = 0.2\nheight = 0.43\n";
+
 #[test]
 fn every_member_is_covered_by_a_law() {
     let folder = tempfile::tempdir().unwrap();
@@ -147,6 +151,7 @@ fn every_member_is_covered_by_a_law() {
         rubble(folder.path(), "direct", false, ""),
         rubble(folder.path(), "hybrid", false, ""),
         ripples("hybrid", "[gait]\ncycle = 1.2\nduty = 0.75\n").replace("anymal_towr", "anymal_c"),
+        ripples("direct", WAYPOINTS),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();

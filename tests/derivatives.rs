@@ -187,6 +187,34 @@ fn blocks_over_edges_match_differences() {
     }
 }
 
+/// Way-points with and without times, with headings and heights, also while feet swing.
+#[test]
+fn way_points_match_differences() {
+    let extra = "[[goal.waypoints]]\nposition = [0.4, 0.2]\n\
+                 [[goal.waypoints]]\nposition = [0.5, 0.1]\ntime = 1.1\nyaw = 0.3\nheight = 0.45\n";
+    for formulation in ["warped", "direct", "hybrid"] {
+        for (terrain, text) in TERRAINS {
+            let problem = problem(text, formulation, extra);
+            let rows = |name: &str| {
+                let found = problem.blocks().find(|(block, _)| block.name() == name);
+                found.map_or(0, |(block, _)| block.rows())
+            };
+            assert_eq!([rows("way-points"), rows("goal")], [7, 3]);
+            let swings = |k: usize| {
+                problem
+                    .model
+                    .layout
+                    .feet
+                    .iter()
+                    .flat_map(|f| &f.swings)
+                    .any(|s| s.swing.start < k as f64 && (k as f64) < s.swing.end)
+            };
+            assert!(swings(22));
+            check(problem, &format!("{terrain}, {formulation}"));
+        }
+    }
+}
+
 #[test]
 fn other_laws_and_cones_match_differences() {
     for formulation in ["warped", "direct", "hybrid"] {

@@ -1,4 +1,4 @@
-//! What the plan says of itself, against the scenario that it carries: robot, limits, timing, start, goal, solver.
+//! What the plan says of itself, against the scenario that it carries: robot, limits, timing, solver.
 //!
 //! Where robot or friction differ, the plan is judged by what the scenario asks for.
 
@@ -6,7 +6,6 @@ use std::path::Path;
 
 use super::laws;
 use super::subject::{Finding, Subject, Worst, larger};
-use super::vector::{dot, rotate};
 use crate::plan::{MetaRobot, Plan};
 use crate::robot::{Box3, Robot};
 use crate::scenario::{Formulation, Scenario};
@@ -14,8 +13,6 @@ use crate::{Error, Result};
 
 /// Acceleration of gravity of every plan, m/s².
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-/// A shorter way, m, has no direction: the robot then heads along x.
-const NO_WAY: f64 = 1e-9;
 /// Relative difference of numbers that are the same up to rounding.
 const ROUNDING: f64 = 1e-9;
 /// How far the violation in the history may be from that of the result, as a fraction of the tolerance.
@@ -64,7 +61,6 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, remarks: &mut V
     findings.push((laws::MAGNITUDE, Worst::overall(magnitude(s.plan))));
     findings.push((laws::HISTORY, Worst::overall(history(s))));
     horizon(s, findings);
-    ends(s, findings);
 }
 
 /// The largest number in the plan but for the history. Numbers near the largest that there are would turn into infinities and into what
@@ -248,34 +244,4 @@ fn horizon(s: &Subject, findings: &mut Vec<Finding>) {
         worst.meet((durations.iter().sum::<f64>() - horizon).abs(), s.samples - 1, Some(e));
     }
     findings.push((laws::HORIZON, worst));
-}
-
-fn ends(s: &Subject, findings: &mut Vec<Finding>) {
-    let (start, goal) = (&s.scenario.start, &s.scenario.goal);
-    let last = s.samples - 1;
-    let distance = |n: usize, [x, y]: [f64; 2]| {
-        let p = s.plan.base_position[n];
-        let mut worst = Worst::default();
-        worst.meet(1e3 * (p[0] - x).hypot(p[1] - y), n, None);
-        worst
-    };
-    findings.push((laws::START, distance(0, start.position)));
-    findings.push((laws::GOAL, distance(last, goal.position)));
-    let way: [f64; 2] = std::array::from_fn(|k| goal.position[k] - start.position[k]);
-    let toward = if way[0].hypot(way[1]) < NO_WAY { 0.0 } else { way[1].atan2(way[0]) };
-    let yaw = start.yaw.unwrap_or(toward);
-    // The base stands along the ground: its lateral axis, not its forward axis, is normal to the heading.
-    let axis = |n: usize, axis: [f64; 3]| rotate(s.plan.base_quaternion_wxyz[n], axis);
-    let heading = [yaw.cos(), yaw.sin(), 0.0];
-    let [forward, left] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|a| dot(axis(0, a), heading));
-    let mut worst = Worst::default();
-    worst.meet(left.atan2(forward).abs(), 0, None);
-    findings.push((laws::START_YAW, worst));
-    if let Some(yaw) = goal.yaw {
-        let [x, y, _] = axis(last, [1.0, 0.0, 0.0]);
-        let off = y.atan2(x) - yaw;
-        let mut worst = Worst::default();
-        worst.meet(off.sin().atan2(off.cos()).abs(), last, None);
-        findings.push((laws::GOAL_YAW, worst));
-    }
 }

@@ -105,9 +105,14 @@ laws! {
     GROUND_MOVED = "ground_moved", "mm", Some(15.0), None,
         "how far smoothing moved the ground under a foothold, which may be anywhere";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
-    START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the goal, at the beginning";
+    START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the first way-point or the goal, at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
-    GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given";
+    GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given, and from goal.turns on the way there";
+    WAYPOINT = "waypoint", "mm", Some(1.0), None,
+        "distance from way-points at their times, and beyond goal.waypoint_distance from those without, in order, and from the points of a circle";
+    WAYPOINT_YAW = "waypoint_yaw", "rad", Some(1e-3), None, "difference from the yaw of way-points at their times";
+    HEIGHT = "height", "mm", Some(1.0), None,
+        "difference from goal.height at the end, and from the height of way-points at their times, over the mean of the feet";
     BASE_JUMP = "base_jump", "mm", Some(0.5), None, "the base position has no jumps";
     FOOT_JUMP = "foot_jump", "mm", Some(0.5), None, "the foot positions have no jumps";
     FORCE_JUMP = "force_jump", "% m g", Some(3.0), None, "the forces have no jumps, not even at lift-off and touch-down";

@@ -18,6 +18,7 @@ mod splines;
 mod subject;
 mod terrain;
 mod vector;
+mod way;
 
 use crate::Result;
 use crate::plan::{CheckRow, Plan};
@@ -58,6 +59,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     let mut residuals = Residuals { t: plan.t.clone(), ..Default::default() };
     let (mut findings, mut remarks) = (Vec::new(), Vec::new());
     claims::findings(&subject, &mut findings, &mut remarks);
+    way::findings(&subject, &mut findings);
     splines::findings(&subject, &mut findings)?;
     terrain::findings(&subject, &mut findings)?;
     derivatives::findings(&subject, &mut findings)?;

@@ -118,6 +118,41 @@ impl<'a> Subject<'a> {
         self.plan.foot_contact[n * self.feet + e]
     }
 
+    /// Height of the center of mass over the mean of the feet, m. A foot that swings counts as on the line, over time, between its
+    /// footholds before and after.
+    pub fn height_over_feet(&self, n: usize) -> f64 {
+        let under = |e: usize| {
+            let at = |n: usize| self.foot_position(n, e)[2];
+            if self.in_contact(n, e) {
+                return at(n);
+            }
+            let before = (0..n).rev().find(|&m| self.in_contact(m, e));
+            let after = (n..self.samples).find(|&m| self.in_contact(m, e));
+            match (before, after) {
+                (Some(a), Some(b)) => {
+                    let [lift_off, touch_down] =
+                        self.switches(e, self.plan.t[n]).unwrap_or([self.plan.t[a], self.plan.t[b]]);
+                    at(a) + (self.plan.t[n] - lift_off) / (touch_down - lift_off) * (at(b) - at(a))
+                }
+                (Some(stands), None) | (None, Some(stands)) => at(stands),
+                (None, None) => at(n),
+            }
+        };
+        self.plan.base_position[n][2] - (0..self.feet).map(under).sum::<f64>() / self.feet as f64
+    }
+
+    /// Lift-off and touch-down of the swing of a foot around a time, s.
+    fn switches(&self, e: usize, time: f64) -> Option<[f64; 2]> {
+        let mut start = 0.0;
+        for (i, duration) in self.plan.phase_durations[e].iter().enumerate() {
+            if i % 2 == 1 && (start..=start + duration).contains(&time) {
+                return Some([start, start + duration]);
+            }
+            start += duration;
+        }
+        None
+    }
+
     /// Whether the ground has edges, so that feet stand on patches.
     pub fn has_edges(&self) -> bool {
         !self.plan.patches.is_empty()

@@ -15,6 +15,7 @@ pub mod goal;
 pub mod joint_speed;
 pub mod joint_torque;
 pub mod knee_clearance;
+pub mod linear;
 pub mod margins;
 pub mod newton_euler;
 pub mod normal_force;

@@ -135,8 +135,27 @@ impl Document {
         parts.fold(first, |value, part| value.and_then(|v| v.get(part))).is_some()
     }
 
+    /// Where a value was set, for messages about another one that contradicts it.
+    pub fn place(&self, key: &str) -> String {
+        match self.origin(key) {
+            (Some(Origin::Line(line)), true) => format!("{key}, line {line}"),
+            (Some(Origin::Override(assignment)), true) => format!("--set {assignment}"),
+            _ => format!("{key}, by default"),
+        }
+    }
+
     /// An input error at a key, with file and line; for a missing key, the line of the table that lacks it.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
+        let at = match self.origin(key).0 {
+            Some(Origin::Line(line)) => format!("{}:{line}", self.file),
+            Some(Origin::Override(assignment)) => format!("--set {assignment}"),
+            None => self.file.clone(),
+        };
+        Error::input(format!("{at}: {key}: {what}"))
+    }
+
+    /// Where the value at a key was set, or else the innermost of the tables and arrays around it; and whether there is a value.
+    fn origin(&self, key: &str) -> (Option<&Origin>, bool) {
         let (mut origins, mut origin, mut rest) = (&self.origins, None, key);
         while !rest.is_empty() {
             // A key in quotes may itself have dots.
@@ -146,12 +165,7 @@ impl Document {
             origin = inner.here.as_ref().or(origin);
             rest = rest[part.len()..].trim_start_matches('.');
         }
-        let at = match origin {
-            Some(Origin::Line(line)) => format!("{}:{line}", self.file),
-            Some(Origin::Override(assignment)) => format!("--set {assignment}"),
-            None => self.file.clone(),
-        };
-        Error::input(format!("{at}: {key}: {what}"))
+        (origin, rest.is_empty())
     }
 }
 

@@ -6,7 +6,7 @@ use super::leg_terms::LegTerms;
 use crate::leg::Leg;
 use crate::leg::body::Body;
 use crate::robot::{Box3, Foot, Robot};
-use crate::scenario::{Legs, Scenario};
+use crate::scenario::{Legs, Scenario, Stop};
 use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::spline::SwingShape;
@@ -23,6 +23,17 @@ pub const LEAST_NORMAL_FORCE: f64 = 0.02;
 
 /// Points of the torso's underside at which its clearance is constrained, along x and y.
 pub const UNDERSIDE: [usize; 2] = [5, 3];
+
+/// A place that the base passes at a sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visit {
+    /// When.
+    pub sample: usize,
+    /// Where.
+    pub stop: Stop,
+    /// How near, if the stop has no time, m.
+    pub distance: f64,
+}
 
 /// Robot, ground, space and layout. Units of the NLP: m, s, forces in m g, torques in m g · 1 m.
 #[derive(Clone, Debug)]
@@ -55,6 +66,8 @@ pub struct Model {
     pub surfaces: Surfaces,
     /// `patches[foot][stance]`: where each stance must be. Empty where feet may stand anywhere.
     pub patches: Vec<Vec<Patch>>,
+    /// When the base is where on its way.
+    pub visits: Vec<Visit>,
     /// The spaces of the variables.
     pub spaces: Spaces,
     /// The variables.
@@ -99,6 +112,7 @@ impl Model {
             underside,
             surfaces,
             patches: Vec::new(),
+            visits: Vec::new(),
             spaces,
             threads: scenario.solver.threads,
             layout: Layout::new(

@@ -1,22 +1,26 @@
-//! Where the base is guessed to be at each time: a straight line in the space of its variables. Footholds are chosen along it.
+//! Where the base is guessed to be at each time: along its way, straight in the space of its variables where the way is straight. Footholds
+//! are chosen along it.
 
 use nalgebra::{Vector2, Vector3};
 
+use super::pace::{Pace, interpolated};
 use super::retiming::{Corridor, retimed};
 use super::standing::{Pose, ensure_reach, pulled_back, standing_pose};
+use super::way::{Place, Way};
 use crate::Result;
 use crate::nlp::Model;
-use crate::scenario::Scenario;
+use crate::nlp::model::Visit;
+use crate::scenario::{Scenario, wrapped};
 use crate::terrain::Patch;
 use crate::trajectory::Stance;
 use crate::trajectory::rotation::euler_angles;
 
 /// The base departs this long before the first swing, and arrives this long after the last one, s.
 const LEAD: f64 = 0.2;
-/// Time in which the base speeds up and slows down: this fraction of its travel time, …
-const RAMP_FRACTION: f64 = 0.2;
-/// … but at most this long, s.
-const LONGEST_RAMP: f64 = 0.8;
+/// Distance of the poses at which it is looked up which footholds are within reach, m, for a robot of ANYmal's size.
+const PROBES: f64 = 0.02;
+/// A foot that moves less than this fraction of the way counts as one that does.
+const LEAST_GAIN: f64 = 0.25;
 
 /// Where the base is guessed to be at each time.
 #[derive(Clone)]
@@ -24,14 +28,42 @@ pub struct BasePath<'a> {
     model: &'a Model,
     /// Poses at the start and at the goal, in the variables.
     pub ends: [[f64; 6]; 2],
-    /// Heading at the start and at the goal, ambient, rad.
-    yaw: [f64; 2],
-    /// When the base departs and when it arrives, s.
-    travel: [f64; 2],
+    way: Way,
+    /// The base in the variables at each place of a way that is not straight, if the variables are not ambient.
+    bent: Option<Vec<[f64; 6]>>,
+    pace: Pace,
     /// Length of the way, m; a turn counts as the way of the feet. At least a millimeter.
     pub length: f64,
     /// Fraction of the way covered at each sample, if not by steady travel.
     timing: Option<Vec<f64>>,
+}
+
+/// How a foot at its nominal place moves while the base goes along its way.
+#[derive(Clone, Copy, Debug)]
+pub struct FootMotion {
+    /// Unit vector, base frame.
+    pub in_base: Vector2<f64>,
+    /// Unit vector, world frame.
+    pub in_world: Vector2<f64>,
+    /// Way of the foot for one of the base.
+    pub gain: f64,
+}
+
+impl FootMotion {
+    /// Half the length of a box in this direction, as a way of the base, m.
+    pub fn half_chord(&self, half_size: &[f64; 3]) -> f64 {
+        (0..2).map(|c| half_size[c] / self.in_base[c].abs()).fold(f64::INFINITY, f64::min) / self.gain
+    }
+
+    /// Half the length of a box across this direction, m.
+    pub fn half_across(&self, half_size: &[f64; 3]) -> f64 {
+        (0..2).map(|c| half_size[1 - c] / self.in_base[c].abs()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far a vector of the base frame leads in this direction, as a way of the base, m.
+    pub fn along(&self, x: f64, y: f64) -> f64 {
+        self.in_base.dot(&Vector2::new(x, y)) / self.gain
+    }
 }
 
 /// A path shorter than this, m, is not worth another timing.
@@ -46,14 +78,27 @@ impl<'a> BasePath<'a> {
     /// When a pose has no preimage under the map, or a foot cannot reach the ground at the start.
     pub fn new(scenario: &Scenario, model: &'a Model) -> Result<Self> {
         let layout = &model.layout;
-        let yaw = scenario.start_yaw();
-        let goal_yaw = scenario.goal.yaw.unwrap_or(yaw);
-        let pose = |xy: [f64; 2], yaw: f64| standing_pose(&model.nominal, &model.surfaces.posture, xy, yaw);
-        let start = pose(scenario.start.position, yaw);
-        ensure_reach(model, &start, scenario.start.position)?;
-        let first = pulled_back(&model.spaces.base, &start)?;
-        let mut last = pulled_back(&model.spaces.base, &pose(scenario.goal.position, goal_yaw))?;
-        last[5] = first[5] + wrapped(last[5] - first[5]);
+        let feet = model.nominal.iter().map(|n| n.xy().norm()).fold(0.0, f64::max);
+        let way = Way::new(scenario, model.size, feet);
+        let in_variables = |[x, y, heading]: Place| {
+            pulled_back(
+                &model.spaces.base,
+                &standing_pose(&model.nominal, &model.surfaces.posture, [x, y], heading),
+            )
+        };
+        let [start, goal] = [way.at(0.0), way.at(way.length)];
+        let pose = standing_pose(&model.nominal, &model.surfaces.posture, scenario.start.position, start[2]);
+        ensure_reach(model, &pose, scenario.start.position)?;
+        let first = pulled_back(&model.spaces.base, &pose)?;
+        let unwound = |mut y: [f64; 6], heading: f64| {
+            let expected = first[5] + heading - start[2];
+            y[5] = expected + wrapped(y[5] - expected);
+            y
+        };
+        let last = unwound(in_variables(goal)?, goal[2]);
+        let bent = (model.spaces.base.is_warped() && !way.is_straight()).then(|| {
+            way.places().map(|(_, place)| Ok(unwound(in_variables(*place)?, place[2]))).collect::<Result<_>>()
+        });
 
         let horizon = layout.intervals as f64 * layout.time_step;
         let swings = || layout.feet.iter().flat_map(|f| &f.swings).map(|s| s.swing);
@@ -61,15 +106,19 @@ impl<'a> BasePath<'a> {
         let last_touch_down = swings().map(|s| s.end).reduce(f64::max);
         let depart = first_lift_off.map_or(0.0, |k| k * layout.time_step - LEAD).max(0.0);
         let arrive = last_touch_down.map_or(horizon, |k| k * layout.time_step + LEAD).min(horizon);
-        let [from, to] = [scenario.start.position, scenario.goal.position];
-        let feet = model.nominal.iter().map(|n| n.xy().norm()).fold(0.0, f64::max);
-        let turn = wrapped(goal_yaw - yaw).abs() * feet;
+        let stops: Vec<(f64, f64)> = scenario
+            .stops()
+            .iter()
+            .zip(&way.stops)
+            .filter_map(|(stop, at)| Some((stop.time?, *at)))
+            .collect();
         let path = Self {
             model,
             ends: [first, last],
-            yaw: [yaw, goal_yaw],
-            travel: [depart, arrive],
-            length: ((to[0] - from[0]).hypot(to[1] - from[1]) + turn).max(1e-3),
+            length: way.length,
+            pace: Pace::new([depart, arrive], way.length, &stops, layout.intervals, layout.time_step),
+            bent: bent.transpose()?,
+            way,
             timing: None,
         };
         if model.patches.is_empty() {
@@ -82,60 +131,97 @@ impl<'a> BasePath<'a> {
     /// The same way in another time, so that the feet reach their footholds: `footholds[foot][stance]`, x and y.
     pub fn retimed(&self, footholds: &[Vec<[f64; 2]>]) -> Self {
         let layout = &self.model.layout;
-        let steady = |k: usize| progress(k as f64 * layout.time_step, self.travel[0], self.travel[1]);
-        let [from, to] = [0.0, 1.0].map(|u| self.pose_on_way(u).position.xy());
-        let length = (to - from).norm();
-        let timing = (length > SHORTEST).then(|| {
-            let nominal: Vec<f64> = (0..=layout.intervals).map(|k| length * steady(k)).collect();
-            let corridors = self.corridors(footholds, &from, &((to - from) / length));
-            let s = retimed(&nominal, &corridors, layout.time_step);
-            s.into_iter().map(|s| s / length).collect()
+        let timing = (self.length > SHORTEST).then(|| {
+            let nominal: Vec<f64> =
+                (0..=layout.intervals).map(|k| self.steady(k as f64 * layout.time_step)).collect();
+            let s = retimed(&nominal, &self.corridors(footholds), &self.pace.pins, layout.time_step);
+            s.into_iter().map(|s| s / self.length).collect()
         });
         Self { timing, ..self.clone() }
     }
 
+    /// When the stops of a scenario are passed.
+    pub fn visits(&self, scenario: &Scenario) -> Vec<Visit> {
+        let layout = &self.model.layout;
+        let passed = |at: f64| {
+            let s = |k: usize| self.length * self.progress(k as f64 * layout.time_step);
+            (0..=layout.intervals).min_by(|&a, &b| (s(a) - at).abs().total_cmp(&(s(b) - at).abs()))
+        };
+        let distance = scenario.goal.waypoint_distance;
+        let visit = |(stop, at): (crate::scenario::Stop, &f64)| {
+            let given = stop.time.map(|time| (time / layout.time_step).round() as usize);
+            Visit { sample: given.or(passed(*at)).unwrap_or(0), stop, distance }
+        };
+        scenario.stops().into_iter().zip(&self.way.stops).map(visit).collect()
+    }
+
     /// How long the base travels, s.
     pub fn travel_time(&self) -> f64 {
-        (self.travel[1] - self.travel[0]).max(self.model.layout.time_step)
+        self.pace.travel_time()
     }
 
     /// How far the base is on its way at time t, s, when it travels steadily, m.
     pub fn steady(&self, t: f64) -> f64 {
-        self.length * progress(t, self.travel[0], self.travel[1])
+        self.pace.at(t)
     }
 
-    /// A horizontal unit vector across the way: to the left of the heading in its middle.
-    pub fn sideways(&self) -> [f64; 2] {
-        let left = self.pose_on_way(0.5).rotation.column(1).xy().normalize();
-        [left.x, left.y]
+    /// How a foot moves after a fraction u of the way.
+    pub fn foot_motion(&self, foot: usize, u: f64) -> FootMotion {
+        let step = (PROBES / self.length).min(0.5);
+        let nominal = self.model.nominal[foot];
+        let place = |u: f64| {
+            let pose = self.pose_on_way(u);
+            (pose.position + pose.rotation * nominal).xy()
+        };
+        let moved = place(u + 0.5 * step) - place(u - 0.5 * step);
+        let rotation = self.pose_on_way(u).rotation;
+        let gain = moved.norm() / (step * self.length);
+        let in_world = if gain > 1e-6 { moved.normalize() } else { rotation.column(0).xy().normalize() };
+        let in_base = rotation.tr_mul(&Vector3::new(in_world.x, in_world.y, 0.0)).xy().normalize();
+        FootMotion { in_base, in_world, gain: gain.max(LEAST_GAIN) }
     }
 
-    /// For each stance, from where to where the base can be along the way.
-    fn corridors(
-        &self,
-        footholds: &[Vec<[f64; 2]>],
-        from: &Vector2<f64>,
-        along: &Vector2<f64>,
-    ) -> Vec<Corridor> {
+    /// For each stance, from where to where the base can be along the way: as far as the foothold is within reach, around the place
+    /// that is best.
+    fn corridors(&self, footholds: &[Vec<[f64; 2]>]) -> Vec<Corridor> {
         let layout = &self.model.layout;
+        let count = (self.length / (self.model.size * PROBES)).ceil().max(2.0) as usize;
+        let poses: Vec<Pose> = (0..=count).map(|n| self.pose_on_way(n as f64 / count as f64)).collect();
         let mut corridors = Vec::new();
         for (i, (foot, footholds)) in layout.feet.iter().zip(footholds).enumerate() {
             let reach = &self.model.reach[i];
-            for (stance, foothold) in foot.stances.iter().zip(footholds) {
+            for (stance, [x, y]) in foot.stances.iter().zip(footholds) {
                 let s = &stance.stance;
-                let heading = self.pose(0.5 * (s.start + s.end) * layout.time_step).rotation;
-                let in_world = |v: [f64; 3]| (heading * Vector3::from(v)).xy();
-                let center = Vector2::from(*foothold) - in_world(reach.center) - from;
-                let half: f64 = (0..2)
-                    .map(|d| {
-                        let mut side = [0.0; 3];
-                        side[d] = (1.0 - REACH_MARGIN) * reach.half_size[d];
-                        in_world(side).dot(along).abs()
-                    })
-                    .fold(0.0, f64::max);
-                let at = center.dot(along);
+                let wanted =
+                    self.steady(0.5 * (s.start + s.end) * layout.time_step) / self.length * count as f64;
+                // How far the foothold is out of the box, m.
+                let out = |n: usize| {
+                    let pose = &poses[n];
+                    let local =
+                        pose.rotation.tr_mul(&(Vector3::new(*x, *y, pose.position.z) - pose.position));
+                    let beyond = |d: usize| {
+                        ((local[d] - reach.center[d]).abs() - (1.0 - REACH_MARGIN) * reach.half_size[d])
+                            .max(0.0)
+                    };
+                    beyond(0).hypot(beyond(1))
+                };
+                let outs: Vec<f64> = (0..=count).map(out).collect();
+                let better = |a: &usize, b: &usize| {
+                    let cost = |n: usize| (outs[n], (n as f64 - wanted).abs());
+                    cost(*a).partial_cmp(&cost(*b)).unwrap_or(std::cmp::Ordering::Equal)
+                };
+                let best = (0..=count).min_by(better).unwrap_or(0);
+                let within = |n: &usize| outs[*n] <= outs[best];
+                let first = (0..=best).rev().take_while(within).last().unwrap_or(best);
+                let last = (best..=count).take_while(within).last().unwrap_or(best);
+                let at = |n: usize| self.length * n as f64 / count as f64;
+                // Beyond its ends, where the base does not go, the box may reach farther.
+                let range = [
+                    if first == 0 { f64::NEG_INFINITY } else { at(first) },
+                    if last == count { f64::INFINITY } else { at(last) },
+                ];
                 let samples = [s.start.ceil() as usize, s.end.floor() as usize];
-                corridors.push(Corridor { samples, range: [at - half, at + half] });
+                corridors.push(Corridor { samples, range });
             }
         }
         corridors
@@ -153,10 +239,10 @@ impl<'a> BasePath<'a> {
 
     /// Fraction of the way covered at time t, s.
     fn progress(&self, t: f64) -> f64 {
-        let Some(timing) = &self.timing else { return progress(t, self.travel[0], self.travel[1]) };
-        let k = (t / self.model.layout.time_step).clamp(0.0, (timing.len() - 1) as f64);
-        let before = (k as usize).min(timing.len() - 2);
-        timing[before] + (k - before as f64) * (timing[before + 1] - timing[before])
+        match &self.timing {
+            Some(timing) => interpolated(timing, t / self.model.layout.time_step),
+            None => self.steady(t) / self.length,
+        }
     }
 
     /// The pose after a fraction u of the way, ambient.
@@ -168,16 +254,20 @@ impl<'a> BasePath<'a> {
     /// The base after a fraction u of the way, in the variables.
     fn on_way(&self, u: f64) -> [f64; 6] {
         let [first, last] = &self.ends;
+        if let Some(bent) = &self.bent {
+            let (n, part) = self.way.piece(u * self.length);
+            return std::array::from_fn(|d| bent[n][d] + part * (bent[n + 1][d] - bent[n][d]));
+        }
         if self.model.spaces.base.is_warped() {
             // A straight line in F; the ground is flat there.
             return std::array::from_fn(|d| first[d] + u * (last[d] - first[d]));
         }
-        // A straight line seen from above, standing on the ground at every instant.
-        let xy = [0, 1].map(|c| first[c] + u * (last[c] - first[c]));
-        let heading = self.yaw[0] + u * wrapped(self.yaw[1] - self.yaw[0]);
-        let pose: Pose = standing_pose(&self.model.nominal, &self.model.surfaces.posture, xy, heading);
+        // Seen from above along the way, standing on the ground at every instant.
+        let [x, y, heading] = self.way.at(u * self.length);
+        let pose: Pose = standing_pose(&self.model.nominal, &self.model.surfaces.posture, [x, y], heading);
         let angles = euler_angles(&pose.rotation);
-        [xy[0], xy[1], pose.position.z, angles.x, angles.y, first[5] + wrapped(angles.z - first[5])]
+        let expected = first[5] + heading - self.way.at(0.0)[2];
+        [x, y, pose.position.z, angles.x, angles.y, expected + wrapped(angles.z - expected)]
     }
 }
 
@@ -189,40 +279,5 @@ pub fn middle(stance: &Stance, last: f64) -> f64 {
         last
     } else {
         0.5 * (stance.start + stance.end)
-    }
-}
-
-/// Fraction of the way covered at time t: constant speed with parabolic ends between `from` and `to`.
-fn progress(t: f64, from: f64, to: f64) -> f64 {
-    let duration = to - from;
-    let ramp = (RAMP_FRACTION * duration).min(LONGEST_RAMP);
-    let s = (t - from).clamp(0.0, duration);
-    let speed = 1.0 / (duration - ramp);
-    if s < ramp {
-        0.5 * speed * s * s / ramp
-    } else if s > duration - ramp {
-        1.0 - 0.5 * speed * (duration - s).powi(2) / ramp
-    } else {
-        speed * (s - 0.5 * ramp)
-    }
-}
-
-fn wrapped(angle: f64) -> f64 {
-    angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn progress_runs_from_zero_to_one_without_a_jump() {
-        let mut before = 0.0;
-        for i in 0..=1000 {
-            let u = progress(f64::from(i) * 0.01, 0.3, 9.7);
-            assert!(u >= before - 1e-12 && u - before < 2e-3);
-            before = u;
-        }
-        assert!((before - 1.0).abs() < 1e-12);
     }
 }

@@ -16,7 +16,7 @@ use std::collections::HashSet;
 
 use nalgebra::Vector3;
 
-use super::base_path::{BasePath, REACH_MARGIN, middle};
+use super::base_path::{BasePath, FootMotion, REACH_MARGIN, middle};
 use super::standing::Pose;
 use crate::nlp::Model;
 use crate::terrain::ContactGround;
@@ -100,8 +100,8 @@ pub struct Search<'a> {
     way: Vec<Pose>,
     first: f64,
     apart: f64,
-    /// A horizontal unit vector across the way.
-    sideways: [f64; 2],
+    /// `[foot]`, for each pose of the way.
+    motions: Vec<Vec<FootMotion>>,
     /// By foot, the longest and the highest step, m.
     largest_steps: Vec<[f64; 2]>,
     /// By foot, for each pose of the way.
@@ -119,7 +119,8 @@ impl<'a> Search<'a> {
         // Feet can be ahead of and behind the ends of the way by as much as they reach.
         let beyond = (WINDOW * half / apart).ceil().min(MOST_BEYOND);
         let numbers = 0..=(count + 2.0 * beyond) as usize;
-        let way = numbers.map(|n| path.pose_on_way((n as f64 - beyond) / count)).collect();
+        let fractions: Vec<f64> = numbers.map(|n| (n as f64 - beyond) / count).collect();
+        let way = fractions.iter().map(|&u| path.pose_on_way(u)).collect();
         let first = -beyond * apart;
         let mut search = Self {
             model,
@@ -128,11 +129,14 @@ impl<'a> Search<'a> {
             way,
             first,
             apart,
-            sideways: path.sideways(),
+            motions: vec![],
             largest_steps: (0..model.feet()).map(|foot| largest_step(model, path, foot)).collect(),
             tracks: vec![],
             history: vec![],
         };
+        search.motions = (0..model.feet())
+            .map(|foot| fractions.iter().map(|&u| path.foot_motion(foot, u)).collect())
+            .collect();
         search.tracks = (0..model.feet())
             .map(|foot| (0..search.way.len()).map(|n| search.place(foot, n)).collect())
             .collect();
@@ -144,9 +148,10 @@ impl<'a> Search<'a> {
         let s = self.first + n as f64 * self.apart;
         let (pose, reach) = (&self.way[n], &self.model.reach[foot]);
         let nominal = pose.position + pose.rotation * self.model.nominal[foot];
-        let side = self.sideways;
+        let motion = &self.motions[foot][n];
+        let side = [-motion.in_world.y, motion.in_world.x];
         let spacing = self.contact.grid().spacing[0].min(self.contact.grid().spacing[1]);
-        let steps = (WINDOW * reach.half_size[1] / spacing) as i64;
+        let steps = (WINDOW * motion.half_across(&reach.half_size) / spacing) as i64;
         (-steps..=steps)
             .filter_map(|k| {
                 let aside = k as f64 * spacing;
@@ -229,8 +234,9 @@ impl<'a> Search<'a> {
     /// Where the base can be while a foot is at a place.
     fn within_reach(&self, foot: usize, place: &Place) -> [f64; 2] {
         let reach = &self.model.reach[foot];
-        let half = (1.0 - REACH_MARGIN) * reach.half_size[0];
-        let ahead = self.model.nominal[foot].x - reach.center[0];
+        let (motion, nominal) = (&self.motions[foot][self.number(place.s)], &self.model.nominal[foot]);
+        let half = (1.0 - REACH_MARGIN) * motion.half_chord(&reach.half_size);
+        let ahead = motion.along(nominal.x - reach.center[0], nominal.y - reach.center[1]);
         [place.s + ahead - half, place.s + ahead + half]
     }
 
@@ -297,7 +303,8 @@ impl<'a> Search<'a> {
 
     /// The places of a foot's track around s.
     fn places_around(&self, foot: usize, s: f64) -> Vec<Place> {
-        let window = WINDOW * self.model.reach[foot].half_size[0];
+        let half_size = &self.model.reach[foot].half_size;
+        let window = WINDOW * self.motions[foot][self.number(s)].half_chord(half_size);
         self.tracks[foot].iter().flatten().filter(|place| (place.s - s).abs() <= window).copied().collect()
     }
 
@@ -386,7 +393,9 @@ pub fn obstacle(contact: &ContactGround, from: &Place, to: &Place) -> f64 {
 /// The longest and the highest step of a foot, m.
 pub fn largest_step(model: &Model, path: &BasePath, foot: usize) -> [f64; 2] {
     let travel = path.length / path.travel_time() * model.layout.longest_cycle(foot);
-    let longest = (LONGEST * 2.0 * model.reach[foot].half_size[0]).max(travel);
+    let motion = path.foot_motion(foot, 0.5);
+    let chord = 2.0 * motion.gain * motion.half_chord(&model.reach[foot].half_size);
+    let longest = (LONGEST * chord).max(travel);
     [longest, HIGHEST * -model.nominal[foot].z]
 }
 

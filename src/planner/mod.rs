@@ -3,7 +3,9 @@
 //! | file | holds |
 //! | --- | --- |
 //! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
+//! | `way` | the line of the base from start to goal, with headings |
 //! | `base_path` | where the base is guessed to be at each time |
+//! | `pace` | when it is where on its way, if it travels steadily |
 //! | `footholds` | which patch each stance gets, where feet may stand on patches only |
 //! | `foothold_search` | the search for them |
 //! | `steps` | how many steps a motion takes over edges, and where |
@@ -30,6 +32,7 @@ pub mod guess;
 pub mod legs;
 pub mod motion;
 mod options;
+mod pace;
 pub mod problem;
 mod retiming;
 pub mod solve;
@@ -40,6 +43,7 @@ mod stopping;
 mod threads;
 mod travel;
 pub mod violation;
+mod way;
 
 pub use friction_margin::solve;
 pub use legs::{FINE, LegMotion};

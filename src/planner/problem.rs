@@ -7,7 +7,7 @@ use crate::constraints::foothold_patch::FootholdPatch;
 use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
 use crate::constraints::friction_conformal::FrictionConformal;
-use crate::constraints::goal::Goal;
+use crate::constraints::goal::{goal, way_points};
 use crate::constraints::joint_speed::JointSpeed;
 use crate::constraints::joint_torque::JointTorque;
 use crate::constraints::knee_clearance::KneeClearance;
@@ -97,8 +97,11 @@ impl GaitProblem {
             Box::new(OnGround::new(&model)),
             Box::new(SwingClearance::new(&model, motion.swing_clearance)),
             Box::new(BaseClearance::new(&model, motion.base_clearance)),
-            Box::new(Goal::new(&model, scenario.goal.position, scenario.goal.yaw)),
+            Box::new(goal(&model, scenario)),
         ];
+        if !model.visits.is_empty() {
+            blocks.push(Box::new(way_points(&model)));
+        }
         if model.surfaces.have_edges() {
             blocks.push(Box::new(FootholdPatch::new(&model)));
         } else if let Some(max_slope) = contact.max_slope {

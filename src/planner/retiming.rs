@@ -27,8 +27,8 @@ pub struct Corridor {
     pub range: [f64; 2],
 }
 
-/// s at each sample, from the steady travel.
-pub fn retimed(nominal: &[f64], corridors: &[Corridor], time_step: f64) -> Vec<f64> {
+/// s at each sample, from the steady travel; at the samples of some `pins`, given values.
+pub fn retimed(nominal: &[f64], corridors: &[Corridor], pins: &[(usize, f64)], time_step: f64) -> Vec<f64> {
     let n = nominal.len();
     if n < 5 {
         return nominal.to_vec();
@@ -64,6 +64,9 @@ pub fn retimed(nominal: &[f64], corridors: &[Corridor], time_step: f64) -> Vec<f
         // At rest at both ends.
         for k in [0, 1, n - 2, n - 1] {
             system.pin(k, nominal[k]);
+        }
+        for &(k, value) in pins {
+            system.pin(k, value);
         }
         s = system.solve();
         if active == before {
@@ -139,14 +142,14 @@ mod tests {
     fn a_way_within_all_corridors_stays() {
         let nominal = steady();
         let corridor = Corridor { samples: [10, 60], range: [0.0, 2.0] };
-        let s = retimed(&nominal, &[corridor], 0.05);
+        let s = retimed(&nominal, &[corridor], &[], 0.05);
         assert!(s.iter().zip(&nominal).all(|(a, b)| (a - b).abs() < 1e-6));
     }
 
     #[test]
     fn the_base_waits_for_a_foot_and_catches_up() {
         let nominal = steady();
-        let s = retimed(&nominal, &[Corridor { samples: [40, 60], range: [0.9, 1.5] }], 0.05);
+        let s = retimed(&nominal, &[Corridor { samples: [40, 60], range: [0.9, 1.5] }], &[], 0.05);
         assert!(s[60] < 1.53 && s[60] > 1.45, "{}", s[60]);
         assert!((s[0] - nominal[0]).abs() < 1e-6 && (s[100] - nominal[100]).abs() < 1e-6);
         assert!(s.windows(2).all(|p| p[1] - p[0] > -1e-3));

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::base_path::BasePath;
 use super::guess;
 use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
@@ -58,7 +59,13 @@ impl Task<'_> {
         let spaces = Spaces::of(self.scenario.formulation(), map)?;
         let Self { scenario, robot, steps, surfaces, .. } = *self;
         let model = Model::new(scenario, robot, &steps.gait, surfaces.clone(), spaces);
-        Ok(Model { patches: steps.patches.clone(), ..model })
+        self.with_visits(Model { patches: steps.patches.clone(), ..model })
+    }
+
+    /// The model with the times at which the guess passes the way-points.
+    fn with_visits(&self, mut model: Model) -> Result<Model> {
+        model.visits = BasePath::new(self.scenario, &model)?.visits(self.scenario);
+        Ok(model)
     }
 
     /// The NLP at its guess, for checks of its derivatives and for timing.
@@ -288,7 +295,8 @@ impl<'a> Solve<'a> {
             },
         };
         let spaces = Spaces::of(scenario.formulation(), map)?;
-        Ok(Some(Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces)))
+        let model = Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces);
+        self.task.with_visits(model).map(Some)
     }
 
     /// Solves again with what the legs' mass adds to the laws along the last motion, until that no longer changes.

@@ -14,7 +14,8 @@ const UNHURRIED: f64 = 1.0;
 /// Horizons longer than this are not proposed, s.
 const LONGEST: f64 = 600.0;
 
-/// Refuses a goal that no motion with one of these gaits can reach; they are the ones that may be planned with.
+/// Refuses a goal that no motion with one of these gaits can reach, and way-points too far apart for their times; the gaits are the ones
+/// that may be planned with.
 ///
 /// # Errors
 /// [`Error::Key`], with a horizon that should do, if one is found.
@@ -22,10 +23,9 @@ pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[(f64, Ga
     if scenario.gait.optimize_durations {
         return Ok(());
     }
-    let [x, y] = way(scenario);
-    let distance = x.hypot(y);
-    let at_most = |foot: &Foot| 2.0 * ALLOWANCE * foot.reach.half_size[0].hypot(foot.reach.half_size[1]);
-    let most = gaits.iter().map(|(_, gait)| range(robot, gait, at_most)).fold(0.0, f64::max);
+    ensure_times(scenario, robot, gaits)?;
+    let distance = scenario.way_length();
+    let most = carried_at_most(robot, gaits, [0.0, scenario.horizon], scenario.time_step);
     if distance <= most {
         return Ok(());
     }
@@ -33,30 +33,81 @@ pub fn ensure_within_range(scenario: &Scenario, robot: &Robot, gaits: &[(f64, Ga
         Some(horizon) => format!("set horizon to {horizon:.0} s or more, or bring the goal nearer"),
         None => "give the feet more steps (gait, horizon), or bring the goal nearer".into(),
     };
+    let over = if scenario.stops().is_empty() { "" } else { ", along the way-points" };
     let what = format!(
-        "{distance:.2} m from the start; in {} s, with the steps of this gait, the legs carry the base {most:.2} m at most: {proposal}",
+        "{distance:.2} m from the start{over}; in {} s, with the steps of this gait, the legs carry the base {most:.2} m at most: {proposal}",
         scenario.horizon
     );
     Err(Error::key("goal.position", what))
 }
 
+/// How far one of the gaits carries the base between two times, s, at most; m.
+fn carried_at_most(robot: &Robot, gaits: &[(f64, Gait)], times: [f64; 2], time_step: f64) -> f64 {
+    let at_most = |foot: &Foot| 2.0 * ALLOWANCE * foot.reach.half_size[0].hypot(foot.reach.half_size[1]);
+    let samples = times.map(|t| (t / time_step).round());
+    gaits.iter().map(|(_, gait)| range(robot, gait, samples, at_most)).fold(0.0, f64::max)
+}
+
+/// Refuses way-points that are too far from the one before, or from start or goal, for their times.
+fn ensure_times(scenario: &Scenario, robot: &Robot, gaits: &[(f64, Gait)]) -> Result<()> {
+    let waypoints = &scenario.goal.waypoints;
+    let places = std::iter::once((scenario.start.position, Some(0.0)))
+        .chain(waypoints.iter().map(|w| (w.position, w.time)))
+        .chain([(scenario.goal.position, Some(scenario.horizon))]);
+    let name = |n: usize| match n {
+        0 => "the start".to_owned(),
+        n if n > waypoints.len() => "the goal".to_owned(),
+        n => format!("goal.waypoints[{}]", n - 1),
+    };
+    let (mut before, mut length, mut last) = ((0, 0.0), 0.0, scenario.start.position);
+    for (n, (place, time)) in places.enumerate() {
+        length += (place[0] - last[0]).hypot(place[1] - last[1]);
+        last = place;
+        let Some(time) = time else { continue };
+        // The whole way is judged with a proposal for its horizon.
+        let (from, whole) = (before, before.0 == 0 && n > waypoints.len());
+        before = (n, time);
+        let way = std::mem::take(&mut length);
+        let most = carried_at_most(robot, gaits, [from.1, time], scenario.time_step);
+        if n == 0 || whole || way <= most {
+            continue;
+        }
+        let what = format!(
+            "{way:.2} m along the way after {}; from {} s to {time} s, with the steps of this gait, the legs carry the base {most:.2} m at most: allow more time, or bring them nearer",
+            name(from.0),
+            from.1
+        );
+        let key = if n > waypoints.len() {
+            "goal.position".to_owned()
+        } else {
+            format!("goal.waypoints[{}].time", n - 1)
+        };
+        return Err(Error::key(key, what));
+    }
+    Ok(())
+}
+
 /// Whether the legs carry the base to the goal with steps not longer than the reach boxes.
 pub fn is_unhurried(scenario: &Scenario, robot: &Robot, gait: &Gait) -> bool {
-    let [x, y] = way(scenario);
-    scenario.gait.optimize_durations || carries(scenario, robot, gait, UNHURRIED) >= x.hypot(y)
+    scenario.gait.optimize_durations
+        || carries(scenario, robot, gait, UNHURRIED) >= scenario.way_length() + turning(scenario, robot)
+}
+
+/// How far the feet go because the base turns, m.
+fn turning(scenario: &Scenario, robot: &Robot) -> f64 {
+    let from_middle = |foot: &Foot| foot.nominal[0].hypot(foot.nominal[1]);
+    // A robot that follows a line turns with it; only a given turn counts.
+    let turn = if scenario.stops().is_empty() { scenario.turn().unwrap_or(0.0) } else { 0.0 };
+    turn.abs() * robot.feet.iter().map(from_middle).fold(0.0, f64::max)
 }
 
 /// How far a gait carries the base, m, if each stance carries it by a fraction of the reach box's chord along the way.
 fn carries(scenario: &Scenario, robot: &Robot, gait: &Gait, fraction: f64) -> f64 {
-    let [x, y] = way(scenario);
+    let first = scenario.stops().first().map_or(scenario.goal.position, |stop| stop.position);
+    let [x, y] = [0, 1].map(|c| first[c] - scenario.start.position[c]);
     let (sin, cos) = (y.atan2(x) - scenario.start_yaw()).sin_cos();
     let chord = |half: [f64; 3]| 2.0 * (half[0] / cos.abs()).min(half[1] / sin.abs());
-    range(robot, gait, |foot| fraction * chord(foot.reach.half_size))
-}
-
-/// From the start to the goal, m.
-fn way(scenario: &Scenario) -> [f64; 2] {
-    [0, 1].map(|c| scenario.goal.position[c] - scenario.start.position[c])
+    range(robot, gait, [0.0, gait.intervals as f64], |foot| fraction * chord(foot.reach.half_size))
 }
 
 /// The shortest horizon, in whole seconds, in which the scenario's gait covers a distance with ease.
@@ -73,10 +124,9 @@ fn easy_horizon(scenario: &Scenario, robot: &Robot, distance: f64) -> Option<f64
     None
 }
 
-/// The longest way that the base can travel, m, if a stance of a foot carries it by a given length: the horizon is covered with
-/// stances, one after the other, such that their lengths sum to the least. Infinite if all feet are in the air at some time.
-fn range(robot: &Robot, gait: &Gait, carried: impl Fn(&Foot) -> f64) -> f64 {
-    let end = gait.intervals as f64;
+/// The longest way that the base can travel between two times, in samples, m, if a stance of a foot carries it by a given length: the time
+/// is covered with stances, one after the other, such that their lengths sum to the least. Infinite if all feet are in the air at some time.
+fn range(robot: &Robot, gait: &Gait, [begin, end]: [f64; 2], carried: impl Fn(&Foot) -> f64) -> f64 {
     let of_foot = |(i, foot): (usize, &Foot)| {
         let length = carried(foot);
         gait.stances(i).into_iter().map(move |stance| (stance.start, stance.end, length))
@@ -86,8 +136,8 @@ fn range(robot: &Robot, gait: &Gait, carried: impl Fn(&Foot) -> f64) -> f64 {
     let mut ends: Vec<f64> = stances.iter().map(|stance| stance.1).collect();
     ends.sort_by(f64::total_cmp);
     ends.dedup();
-    let mut covered: Vec<(f64, f64)> = vec![(0.0, 0.0)];
-    for t in ends {
+    let mut covered: Vec<(f64, f64)> = vec![(begin, 0.0)];
+    for t in ends.into_iter().filter(|t| *t > begin) {
         let least = stances
             .iter()
             .filter(|stance| stance.1 >= t - 1e-9)
@@ -132,6 +182,16 @@ mod tests {
             );
         }
         assert_eq!(refusal(10.0, 3.0, ""), None);
+    }
+
+    #[test]
+    fn way_points_too_far_apart_for_their_times_are_refused() {
+        let point = |x: f64, time: f64| format!("[[goal.waypoints]]\nposition = [{x}, 0.0]\ntime = {time}\n");
+        let message = refusal(10.0, 2.0, &(point(0.2, 4.0) + &point(1.9, 5.0))).expect("a refusal");
+        let expected =
+            "goal.waypoints[1].time: 1.70 m along the way after goal.waypoints[0]; from 4 s to 5 s";
+        assert!(message.starts_with(expected), "{message}");
+        assert_eq!(refusal(10.0, 2.0, &(point(0.2, 4.0) + &point(0.5, 5.0))), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::ground::{DrawnGround, unknown_sample};
 use super::svg::{Font, Svg};
 use super::table::{check_counts, number};
 use crate::plan::Plan;
+use crate::scenario;
 use crate::terrain::Surfaces;
 
 /// A motion shorter than this has no direction to be viewed along, m.
@@ -134,7 +135,18 @@ fn from_above(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4])
             [plan.base_position[0], plan.base_position[plan.t.len() - 1]].map(|p| axes.at(p[0], p[1]));
         svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
         svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
+        for [x, y] in waypoints(plan) {
+            let [u, v] = axes.at(x, y);
+            let diamond = [[u - 6.0, v], [u, v - 6.0], [u + 6.0, v], [u, v + 6.0]];
+            svg.polygon(diamond, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"1.8\"");
+        }
     });
+}
+
+/// Where the scenario of a plan has way-points, x and y, m.
+fn waypoints(plan: &Plan) -> Vec<[f64; 2]> {
+    let scenario = scenario::parse("meta.scenario", &plan.meta.scenario);
+    scenario.map_or(Vec::new(), |scenario| scenario.goal.waypoints.iter().map(|w| w.position).collect())
 }
 
 /// Index and position of each sample of one foot.

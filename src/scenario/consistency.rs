@@ -3,13 +3,12 @@
 //! The schema has already checked keys, types and ranges. Only two kinds of refusal come later: what depends on the
 //! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
 
-use std::f64::consts::TAU;
-
 use super::format::{Formulation, Scenario};
 use super::gait::GaitKind;
 use super::map::MapMethod;
 use super::motion::{Law, Legs};
 use super::terrain::TerrainSpec;
+use super::way;
 use crate::Result;
 use crate::input::{Document, closest};
 use crate::robot::Robot;
@@ -24,7 +23,7 @@ const PHASE_TOLERANCE: f64 = 1e-6;
 /// Refuses values that do not fit together. The scenario in a plan is checked without its robot, whose file may be gone.
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
     one_robot(document)?;
-    headings(document, scenario)?;
+    way::check(document, scenario)?;
     terrain(document, scenario)?;
     if let Some(extent) = scenario.terrain.extent() {
         inside(document, scenario, None, extent)?;
@@ -75,18 +74,7 @@ fn terrain(document: &Document, scenario: &Scenario) -> Result<()> {
     Ok(())
 }
 
-/// Refuses headings that look like degrees.
-fn headings(document: &Document, scenario: &Scenario) -> Result<()> {
-    for (key, yaw) in [("start.yaw", scenario.start.yaw), ("goal.yaw", scenario.goal.yaw)] {
-        if let Some(yaw) = yaw.filter(|yaw| yaw.abs() > TAU) {
-            let what = format!("given {yaw}, allowed: -2π to 2π rad; {yaw}° are {:.4} rad", yaw.to_radians());
-            return Err(document.error(key, what));
-        }
-    }
-    Ok(())
-}
-
-/// Refuses a start or goal at which the base or, where the robot is known, a foot at its nominal place is outside the ground.
+/// Refuses a start, goal or way-point at which the base or, where robot and heading are known, a foot at its nominal place is outside the ground.
 pub(super) fn inside(
     document: &Document,
     scenario: &Scenario,
@@ -100,24 +88,44 @@ pub(super) fn inside(
         let along = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
         along(x, x_min, x_max).hypot(along(y, y_min, y_max))
     };
+    let extent = match &scenario.terrain {
+        TerrainSpec::Heightmap(_) if !document.has("terrain.extent") => String::new(),
+        _ => format!(" ({})", document.place("terrain.extent")),
+    };
     let yaw = scenario.start_yaw();
+    // Where the heading is known. A robot that follows a line arrives with another one.
+    let goal_yaw = scenario.goal_yaw().or(scenario.stops().is_empty().then_some(yaw));
+    let waypoints = scenario.goal.waypoints.iter().enumerate();
+    let waypoints = waypoints.map(|(n, w)| (format!("goal.waypoints[{n}].position"), w.position, w.yaw));
+    let circle = scenario.goal.circle.iter().flat_map(|_| scenario.stops());
+    let circle = circle.map(|stop| ("goal.circle".to_owned(), stop.position, None));
     for (key, place, yaw) in [
-        ("start.position", scenario.start.position, yaw),
-        ("goal.position", scenario.goal.position, scenario.goal.yaw.unwrap_or(yaw)),
-    ] {
+        ("start.position".to_owned(), scenario.start.position, Some(yaw)),
+        ("goal.position".to_owned(), scenario.goal.position, goal_yaw),
+    ]
+    .into_iter()
+    .chain(waypoints)
+    .chain(circle)
+    {
         let [x, y] = place;
+        let given = if key == "goal.circle" {
+            format!("it leads over [{x:.2}, {y:.2}]")
+        } else {
+            format!("given [{x}, {y}]")
+        };
         if beyond(place) > 0.0 {
-            return Err(document.error(key, format!("given [{x}, {y}], outside the terrain; {allowed}")));
+            return Err(document.error(&key, format!("{given}, outside the terrain{extent}; {allowed}")));
         }
+        let Some(yaw) = yaw else { continue };
         for foot in robot.iter().flat_map(|robot| &robot.feet) {
             let ([u, v, _], (sin, cos)) = (foot.nominal, yaw.sin_cos());
             let outside = beyond([x + cos * u - sin * v, y + sin * u + cos * v]);
             if outside > 0.0 {
                 let what = format!(
-                    "given [{x}, {y}], where foot {} would stand {outside:.3} m outside the terrain; for feet {allowed}",
+                    "{given}, where foot {} would stand {outside:.3} m outside the terrain{extent}; for feet {allowed}",
                     foot.name
                 );
-                return Err(document.error(key, what));
+                return Err(document.error(&key, what));
             }
         }
     }

@@ -6,10 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::gait::GaitSpec;
+use super::goal::GoalSpec;
 use super::map::MapSpec;
-use super::motion::{
-    ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Legs, MotionSpec, PhysicsSpec, StartSpec,
-};
+use super::motion::{ContactSpec, DiscretizationSpec, Footholds, Legs, MotionSpec, PhysicsSpec, StartSpec};
 use super::solver::SolverSpec;
 use super::terrain::TerrainSpec;
 use crate::input;
@@ -80,14 +79,6 @@ impl Scenario {
         self.physics.legs.unwrap_or(match self.footholds() {
             Footholds::Patches => Legs::Massless,
             Footholds::Anywhere => Legs::Massive,
-        })
-    }
-
-    /// Heading at the start: the one given, or toward the goal.
-    pub fn start_yaw(&self) -> f64 {
-        self.start.yaw.unwrap_or_else(|| {
-            let d = [0, 1].map(|c| self.goal.position[c] - self.start.position[c]);
-            if d[0].hypot(d[1]) < 1e-9 { 0.0 } else { d[1].atan2(d[0]) }
         })
     }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::consistency;
 use super::format::Scenario;
+use super::way;
 use crate::digest::sha256_hex;
 use crate::input::{self, Document};
 use crate::robot::Robot;
@@ -16,8 +17,8 @@ pub struct LoadedScenario {
     pub scenario: Scenario,
     /// The robot that it names.
     pub robot: Robot,
-    /// The scenario in effect, as TOML: the user's own text, or if there are overrides or the robot is not of ANYmal's size, all values
-    /// with these, and with the lengths that go by its size.
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, or a robot that is not of ANYmal's size, all
+    /// values with these, with the horizon that follows, and with the lengths that go by its size.
     pub effective_text: String,
     /// The user's own text, exactly as it was read.
     pub source_text: String,
@@ -117,11 +118,13 @@ fn assemble(
     }
     let scenario = read(&document)?;
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
+    way::check_speed(&document, &scenario, &robot)?;
     let by_size = set_by_size(&mut document, &scenario, robot.size())?;
-    let scenario = if by_size { read(&document)? } else { scenario };
+    let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
+    let scenario = if by_size || by_speed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
     let effective_text = match overrides {
-        [] if !by_size => source_text.clone(),
+        [] if !(by_size || by_speed) => source_text.clone(),
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
@@ -140,6 +143,8 @@ fn assemble(
 /// Sets the lengths that the scenario leaves to the robot: the defaults, which are for ANYmal, times the robot's size. Whether there are any.
 fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Result<bool> {
     let (motion, contact, map) = (&scenario.motion, &scenario.contact, &scenario.map);
+    let distance = ("goal.waypoint_distance", scenario.goal.waypoint_distance);
+    let distance = (!scenario.stops().is_empty()).then_some(distance);
     let lengths = [
         ("motion.swing_clearance", motion.swing_clearance),
         ("motion.base_clearance", motion.base_clearance),
@@ -147,7 +152,7 @@ fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Resul
         ("map.thickness", map.thickness),
     ];
     let mut found = false;
-    for (key, default) in lengths {
+    for (key, default) in lengths.into_iter().chain(distance) {
         if size != 1.0 && !document.has(key) {
             let length = (1e4 * size * default).round() / 1e4;
             document.set(&format!("{key}={length:?}"))?;
@@ -155,6 +160,17 @@ fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Resul
         }
     }
     Ok(found)
+}
+
+/// Sets the horizon that follows from the speed, where that is given and the horizon is not. Whether it does.
+fn set_by_speed(document: &mut Document, scenario: &Scenario, robot: &Robot) -> Result<bool> {
+    match way::horizon(scenario, robot) {
+        Some(horizon) if !document.has("horizon") => {
+            document.set(&format!("horizon={horizon:?}"))?;
+            Ok(true)
+        }
+        _ => Ok(false),
+    }
 }
 
 fn located(document: &Document, error: Error) -> Error {

@@ -7,23 +7,28 @@ mod consistency;
 pub mod examples;
 mod format;
 mod gait;
+mod goal;
 mod load;
 mod map;
 mod motion;
 mod solver;
+mod stops;
 mod template;
 pub mod terrain;
 #[cfg(test)]
 mod tests;
+mod way;
 
 pub use crate::robot::RobotSpec;
 pub use format::{Formulation, Scenario, json_schema};
 pub use gait::{GaitKind, GaitSpec};
+pub use goal::{CircleSpec, GoalSpec, WaypointSpec};
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
 pub use motion::{
-    Cone, ContactSpec, DiscretizationSpec, Footholds, GoalSpec, Law, Legs, MotionSpec, PhysicsSpec, StartSpec,
+    Cone, ContactSpec, DiscretizationSpec, Footholds, Law, Legs, MotionSpec, PhysicsSpec, StartSpec,
 };
 pub use solver::{Continuation, ContinuationMode, Effort, Hessian, SolverSpec};
+pub use stops::{Stop, wrapped};
 pub use template::template;
 pub use terrain::TerrainSpec;

@@ -1,5 +1,4 @@
-//! `[start]`, `[goal]`, `[motion]`, `[contact]`, `[physics]` and `[discretization]`: what the motion must do, and which
-//! laws it obeys.
+//! `[start]`, `[motion]`, `[contact]`, `[physics]` and `[discretization]`: where the motion starts, and which laws it obeys.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,16 +10,6 @@ pub struct StartSpec {
     /// x, y of the base, m.
     pub position: [f64; 2],
     /// Heading, rad; default: toward the goal.
-    pub yaw: Option<f64>,
-}
-
-/// `[goal]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GoalSpec {
-    /// x, y of the base at the end, m; a hard constraint.
-    pub position: [f64; 2],
-    /// Heading at the end, rad; if given, a hard constraint.
     pub yaw: Option<f64>,
 }
 
