@@ -6,7 +6,7 @@
 //!
 //! at the last sample, and at the time of a way-point that has one. A way-point without a time is passed at the sample at which the guess
 //! passes it, within a square that has the corners at [`crate::scenario::GoalSpec::waypoint_distance`]. Heights are those over the mean of
-//! the feet; of one that swings, that of the ground between its footholds ([`ground_under`]).
+//! the feet; of one that swings, that of the ground between its footholds.
 //!
 //! Rows: x, y in m, then the heading (sine of the error), then the height in m; at way-points also the cosine of the error, at least 0.
 

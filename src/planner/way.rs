@@ -208,7 +208,7 @@ mod tests {
         let aside = way(&format!("[start]\nposition = [0, 0]\nyaw = 1.0\n{bend}"));
         for (way, offset) in [(forward, 0.0), (aside, 1.0)] {
             assert!((way.at(0.0)[2] - offset).abs() < 1e-12);
-            assert!((way.at(way.length)[2] - offset - 1.5708).abs() < 1e-4);
+            assert!((way.at(way.length)[2] - offset - std::f64::consts::FRAC_PI_2).abs() < 1e-4);
             let [x, y, _] = way.at(way.stops[0]);
             assert!((x - 2.0).hypot(y) < 0.1, "({x}, {y})");
             // The heading does not jump.
