@@ -12,6 +12,7 @@ mod derivatives;
 mod durations;
 mod edges;
 mod exact;
+mod gaits;
 mod measured_ground;
 mod motions;
 mod outputs;

@@ -12,6 +12,9 @@ use crate::{Error, Result};
 /// Fixed-point rounds in which feet and pose are matched; the feet move with the pose.
 const ROUNDS: usize = 3;
 
+/// m²: what a slope costs with fewer than three feet, beside their distances from the plane.
+const LEVEL: f64 = 1e-6;
+
 /// A standing pose on the ground: position of the center of mass and orientation, ambient.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
@@ -40,6 +43,10 @@ pub fn standing_pose(nominal: &[Vector3<f64>], ground: &Heightfield, xy: [f64; 2
             let row = Vector3::new(1.0, q.x - xy[0], q.y - xy[1]);
             a += row * row.transpose();
             b += row * q.z;
+        }
+        // One foot, or two, do not say how the ground slopes: as little as they allow.
+        if nominal.len() < 3 {
+            a += Matrix3::from_diagonal(&Vector3::new(0.0, LEVEL, LEVEL));
         }
         let plane = a.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * b);
         let normal = Vector3::new(-plane[1], -plane[2], 1.0).normalize();

@@ -4,9 +4,10 @@
 //! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
 
 use super::format::{Formulation, Scenario};
-use super::gait::GaitKind;
+use super::gait_kind::GaitKind;
 use super::map::MapMethod;
 use super::motion::{Law, Legs};
+use super::sequence;
 use super::terrain::TerrainSpec;
 use super::way;
 use crate::Result;
@@ -34,6 +35,7 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
         legs(document, scenario, robot)?;
     }
     map(document, scenario)?;
+    sequence::check(document, &scenario.gait, scenario.horizon)?;
     durations(document, scenario)?;
     phases(document, scenario)?;
     if let Some(robot) = robot {
@@ -179,7 +181,8 @@ fn durations(document: &Document, scenario: &Scenario) -> Result<()> {
         let what = format!("given [{least}, {most}], allowed: [shortest, longest] in s, the first smaller");
         return Err(document.error("gait.duration_bounds", what));
     }
-    if gait.optimize_durations && gait.kind == GaitKind::Stand {
+    let stands = gait.sections().iter().all(|section| section.kind == GaitKind::Stand);
+    if gait.optimize_durations && stands {
         let what = "given true, but kind = \"stand\" has no steps whose durations could be optimized; set it to false";
         return Err(document.error("gait.optimize_durations", what));
     }

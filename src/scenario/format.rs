@@ -74,11 +74,12 @@ impl Scenario {
     }
 
     /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is
-    /// massless: massive legs cost iterations and reach there (docs/results.md).
+    /// massless: massive legs cost iterations and reach there (docs/results.md). So it is with flight, in which nothing holds the trunk
+    /// against the legs, and what they add often does not settle.
     pub fn legs(&self) -> Legs {
         self.physics.legs.unwrap_or(match self.footholds() {
-            Footholds::Patches => Legs::Massless,
-            Footholds::Anywhere => Legs::Massive,
+            Footholds::Anywhere if !self.gait.flies() => Legs::Massive,
+            _ => Legs::Massless,
         })
     }
 

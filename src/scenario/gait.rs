@@ -3,24 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `gait.kind`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum GaitKind {
-    /// One foot at a time: LH, LF, RH, RF.
-    #[default]
-    Walk,
-    /// Diagonal pairs.
-    Trot,
-    /// Lateral pairs.
-    Pace,
-    /// Front and hind pairs.
-    Bound,
-    /// No steps.
-    Stand,
-    /// A table of phase durations per foot.
-    Custom,
-}
+use super::gait_kind::GaitKind;
+use super::section::SectionSpec;
 
 /// `[gait]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,10 +12,12 @@ pub enum GaitKind {
 pub struct GaitSpec {
     /// The pattern.
     pub kind: GaitKind,
-    /// Duration of a cycle, s; default: the robot's (anymal_c 1.2), or 1 if it has none; for a walk over smooth ground 1.25 times that.
+    /// Duration of a cycle, s; default: the robot's (anymal_c 1.2), or 1 if it has none; for a walk over smooth ground 1.25 times that; for
+    /// walk and wave a quarter of it for each foot; with flight from the robot's height.
     #[schemars(range(min = 0.1, max = 20.0))]
     pub cycle: Option<f64>,
-    /// Fraction of the cycle that a foot stands; default: walk over smooth ground 5/6, over patches 0.75, others 0.6.
+    /// Fraction of the cycle that a foot stands; default for four feet: walk over smooth ground 5/6, over patches and wave 0.75; trot,
+    /// tripod, pace and bound 0.6, flying-trot 0.4, hop and pronk 0.55 (on one foot 0.65).
     #[schemars(range(min = 0.1, max = 1.0))]
     pub duty: Option<f64>,
     /// Whether the phase durations are variables.
@@ -39,6 +25,9 @@ pub struct GaitSpec {
     /// Shortest and longest phase duration, s.
     #[schemars(inner(range(min = 0.01, max = 100.0)))]
     pub duration_bounds: [f64; 2],
+    /// Gaits one after the other, instead of `kind`, `cycle` and `duty`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<Vec<SectionSpec>>,
     /// custom: for each foot, alternating stance and swing durations in s, stance first; they sum to the horizon.
     #[schemars(inner(inner(range(min = 0.01, max = 600.0))))]
     pub phases: Option<Vec<Vec<f64>>>,
@@ -52,6 +41,7 @@ impl Default for GaitSpec {
             duty: None,
             optimize_durations: false,
             duration_bounds: [0.1, 2.0],
+            sequence: None,
             phases: None,
         }
     }

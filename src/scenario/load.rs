@@ -17,8 +17,8 @@ pub struct LoadedScenario {
     pub scenario: Scenario,
     /// The robot that it names.
     pub robot: Robot,
-    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, or a robot that is not of ANYmal's size, all
-    /// values with these, with the horizon that follows, and with the lengths that go by its size.
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, a gait with flight, or a robot that is not of
+    /// ANYmal's size, all values with these, with the horizon that follows, and with the time step and the lengths that go by gait and size.
     pub effective_text: String,
     /// The user's own text, exactly as it was read.
     pub source_text: String,
@@ -121,10 +121,12 @@ fn assemble(
     way::check_speed(&document, &scenario, &robot)?;
     let by_size = set_by_size(&mut document, &scenario, robot.size())?;
     let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
-    let scenario = if by_size || by_speed { read(&document)? } else { scenario };
+    let by_gait = set_by_gait(&mut document, &scenario)?;
+    let changed = by_size || by_speed || by_gait;
+    let scenario = if changed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
     let effective_text = match overrides {
-        [] if !(by_size || by_speed) => source_text.clone(),
+        [] if !changed => source_text.clone(),
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
@@ -171,6 +173,18 @@ fn set_by_speed(document: &mut Document, scenario: &Scenario, robot: &Robot) -> 
         }
         _ => Ok(false),
     }
+}
+
+/// Time step where feet are in the air together, s, if the scenario gives none: flights last a tenth of a second or two.
+const FLIGHT_TIME_STEP: f64 = 0.025;
+
+/// Sets the time step that the scenario leaves to the gait. Whether it does.
+fn set_by_gait(document: &mut Document, scenario: &Scenario) -> Result<bool> {
+    let sets = scenario.gait.flies() && !document.has("time_step");
+    if sets {
+        document.set(&format!("time_step={FLIGHT_TIME_STEP:?}"))?;
+    }
+    Ok(sets)
 }
 
 fn located(document: &Document, error: Error) -> Error {

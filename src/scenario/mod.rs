@@ -7,10 +7,13 @@ mod consistency;
 pub mod examples;
 mod format;
 mod gait;
+mod gait_kind;
 mod goal;
 mod load;
 mod map;
 mod motion;
+mod section;
+mod sequence;
 mod solver;
 mod stops;
 mod template;
@@ -21,13 +24,16 @@ mod way;
 
 pub use crate::robot::RobotSpec;
 pub use format::{Formulation, Scenario, json_schema};
-pub use gait::{GaitKind, GaitSpec};
+pub use gait::GaitSpec;
+pub use gait_kind::GaitKind;
 pub use goal::{CircleSpec, GoalSpec, WaypointSpec};
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
 pub use motion::{
     Cone, ContactSpec, DiscretizationSpec, Footholds, Law, Legs, MotionSpec, PhysicsSpec, StartSpec,
 };
+pub use section::SectionSpec;
+pub use sequence::section_key;
 pub use solver::{Continuation, ContinuationMode, Effort, Hessian, SolverSpec};
 pub use stops::{Stop, wrapped};
 pub use template::template;

@@ -257,6 +257,27 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
         (with("schema = 1", "schema = 0"), vec!["s.toml:1: schema: given 0, allowed: 1"]),
         (with("kind = \"trot\"", "kind = \"custom\""), vec!["s.toml:9: gait.phases: missing"]),
         (
+            with("kind = \"trot\"", "kind = \"trot\"\nsequence = [{ kind = \"walk\" }]"),
+            vec!["s.toml:10: gait.kind: given together with gait.sequence"],
+        ),
+        (with("kind = \"trot\"", "sequence = []"), vec!["s.toml:10: gait.sequence: given none"]),
+        (
+            with("kind = \"trot\"", "sequence = [{ kind = \"walk\", duration = 4.0 }]"),
+            vec!["s.toml:10: gait.sequence: the durations sum to 4 s, but the horizon is 10 s"],
+        ),
+        (
+            with("kind = \"trot\"", "sequence = [{ kind = \"walk\", duration = 10.0 }, { kind = \"trot\" }]"),
+            vec!["s.toml:10: gait.sequence: the durations sum to 10 s, which leaves 0.000 s"],
+        ),
+        (
+            with("kind = \"trot\"", "sequence = [{ kind = \"walk\" }, { kind = \"custom\" }]"),
+            vec!["gait.sequence[1].kind: given \"custom\""],
+        ),
+        (
+            with("kind = \"trot\"", "sequence = [{ kind = \"walk\" }, { kind = \"stand\", cycle = 1.0 }]"),
+            vec!["gait.sequence[1].cycle: given for kind = \"stand\""],
+        ),
+        (
             with("kind = \"trot\"", "kind = \"custom\"\nphases = [[10.0], [4.0, 0.3]]"),
             vec!["s.toml:11: gait.phases[1]: the durations sum to 4.3 s"],
         ),

@@ -3,6 +3,8 @@
 //!
 //! The two formulations differ in [`space`] alone.
 
+mod cadence;
+mod footfall;
 pub mod gait;
 pub mod instant;
 pub mod layout;

@@ -1,5 +1,8 @@
 //! The phases of a foot: stance and swing.
 
+/// Shortest phase of a given gait, in time steps: with fewer, no sample is inside it.
+pub const SHORTEST_PHASE: f64 = 2.0;
+
 /// A phase in which a foot is on the ground; times in samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stance {

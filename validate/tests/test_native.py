@@ -145,7 +145,7 @@ def test_overrides_of_every_kind() -> None:
     for line in ("position = [0.2, 0.0]", 'kind = "stand"', "optimize_durations = false", "tolerance = 0.002"):
         assert line in meta["scenario"]
     for bad, words in (
-        ({"gait.kind": "hop"}, "gait.kind"),
+        ({"gait.kind": "gallop"}, "gait.kind"),
         ({"gait.kind": None}, "no bool"),
         ({"gait": {}}, "no bool"),
         ({1: 2}, "no string"),
