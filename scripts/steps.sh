@@ -17,6 +17,9 @@ fail() {
     exit 1
 }
 
+# commit: which commit this is, for programs that say so in what they write; unknown outside of a repository.
+commit() { git describe --always --dirty --abbrev=12 --exclude='*' 2>/dev/null || echo unknown; }
+
 # step WORDS COMMAND…: runs the command with its output in a log file, which is shown only if it fails.
 step() {
     local words=$1 started=$SECONDS log

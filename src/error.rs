@@ -15,6 +15,18 @@ pub enum Error {
         /// What was given and what is allowed.
         what: String,
     },
+    /// As [`Error::Input`], about the value of a key of a TOML file. Exit code 2.
+    #[error("{file}{}: {key}: {what}", line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Value {
+        /// The file, or the override that set the value.
+        file: String,
+        /// The line that set the value, from 1; none for an override, and where the value is missing.
+        line: Option<usize>,
+        /// The dotted key.
+        key: String,
+        /// What was given and what is allowed.
+        what: String,
+    },
     /// A file could not be read or written. Exit code 2.
     #[error("{path}: {source}")]
     Io {

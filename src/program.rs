@@ -1,4 +1,5 @@
-//! How this program is run once more, in a process of its own: the executable, or a module of the Python that it was loaded into.
+//! Which program this is, and how it is run once more, in a process of its own: the executable, or a module of the Python that it was
+//! loaded into.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,24 @@ pub fn loaded_into(python: PathBuf, file: PathBuf) {
 /// The Python that this program was loaded into; none where it is an executable.
 pub fn host() -> Option<&'static Path> {
     HOST.get().map(|host| &*host.python)
+}
+
+/// What [`commit`] says where it is not known, as in a program that was built from a tarball.
+const UNKNOWN: &str = "unknown";
+
+static COMMIT: OnceLock<&str> = OnceLock::new();
+
+/// Says which commit this program was built from. The first call counts. It is `WARPGAIT_COMMIT` of the environment of the build, which the
+/// scripts set; the library does not read it itself, because it would be compiled again for every commit.
+pub fn built_from(commit: Option<&'static str>) {
+    if let Some(commit) = commit.filter(|commit| !commit.is_empty()) {
+        let _ = COMMIT.set(commit);
+    }
+}
+
+/// The commit that this program was built from, or `unknown`.
+pub fn commit() -> &'static str {
+    COMMIT.get().copied().unwrap_or(UNKNOWN)
 }
 
 /// A command that runs this program; its arguments are still to be added.

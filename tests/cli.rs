@@ -211,20 +211,20 @@ fn validate_runs_python() {
     // Poses as Python: it has the package, prints its arguments, and judges the plan not trackable.
     script(&python, "[ \"$2\" = -c ] && echo found && exit 0\necho \"$@\"\nexit 1");
     let (code, out, _) = validate(&["validate", "a.plan.npz", "--friction", "0.5"]);
-    assert_eq!((code, out.trim()), (1, "-P -m warpgait.validate a.plan.npz --friction 0.5"));
+    assert_eq!((code, out.trim()), (1, "-P -m warpgait.commands.validate a.plan.npz --friction 0.5"));
     let (_, out, _) = validate(&["--json", "validate", "a.plan.npz"]);
-    assert_eq!(out.trim(), "-P -m warpgait.validate a.plan.npz --json");
+    assert_eq!(out.trim(), "-P -m warpgait.commands.validate a.plan.npz --json");
 
     let (_, out, _) = validate(&["validate", "a.plan.npz", "--json"]);
-    assert_eq!(out.trim(), "-P -m warpgait.validate a.plan.npz --json");
+    assert_eq!(out.trim(), "-P -m warpgait.commands.validate a.plan.npz --json");
 
     let (_, out, _) = validate(&["--quiet", "export", "a.plan.npz", "--to", "csv", "--json"]);
-    assert_eq!(out.trim(), "-P -m warpgait.export a.plan.npz --to csv --json --quiet");
+    assert_eq!(out.trim(), "-P -m warpgait.commands.export a.plan.npz --to csv --json --quiet");
 
     let (_, out, _) = validate(&["sweep", "a.toml", "--shard", "1/2"]);
-    assert_eq!(out.trim(), "-P -m warpgait.sweep a.toml --shard 1/2");
+    assert_eq!(out.trim(), "-P -m warpgait.commands.sweep a.toml --shard 1/2");
     let (_, out, _) = validate(&["view", "a.plan.npz", "--html", "a.html"]);
-    assert_eq!(out.trim(), "-P -m warpgait.view a.plan.npz --html a.html");
+    assert_eq!(out.trim(), "-P -m warpgait.commands.view a.plan.npz --html a.html");
 
     // A Python that crashes is neither "not trackable" nor an interruption.
     script(&python, "[ \"$2\" = -c ] && echo found && exit 0\nkill -s SEGV $$");

@@ -16,7 +16,8 @@ fn ground(text: &str, folder: &Path) -> warpgait::Result<Ground> {
 /// The message with which a terrain is refused; it has file and line.
 fn refusal(text: &str, folder: &Path) -> String {
     match ground(text, folder) {
-        Err(Error::Input(message)) => {
+        Err(error @ (Error::Input(_) | Error::Value { .. })) => {
+            let message = error.to_string();
             assert!(message.starts_with("s.toml:"), "{text}: no file and line: {message}");
             message
         }

@@ -91,7 +91,7 @@ def attempt(file: Path, program: str, formulation: str) -> str:
         return f"refused: {solved.stderr.strip().splitlines()[-1]}"
     if solved.returncode != 0:
         return "not solved, or a check fails"
-    replay = [sys.executable, "-m", "warpgait.validate", str(plan), "--no-files", "--json"]
+    replay = [sys.executable, "-m", "warpgait.commands.validate", str(plan), "--no-files", "--json"]
     return str(json.loads(subprocess.run(replay, capture_output=True, text=True, check=False).stdout)["verdict"])
 
 

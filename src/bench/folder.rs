@@ -127,7 +127,7 @@ impl ResultsFolder {
         let stdout = open_for_process(&report).map_err(|e| format!("failed: {e}"))?;
         let mut command = replay::command(python);
         command
-            .args(["-m", "warpgait.validate", "--json", "--no-files", "--no-robust"])
+            .args(["-m", "warpgait.commands.validate", "--json", "--no-files", "--no-robust"])
             .arg(self.plan(case))
             // For matrices as small as these, more threads are slower.
             .env("OPENBLAS_NUM_THREADS", "1")

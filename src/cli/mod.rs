@@ -163,9 +163,9 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Bench(arguments) => bench::bench(arguments, console),
         Command::Robot(arguments) => robot::robot(&arguments, console),
         Command::BenchCase(arguments) => bench::case(&arguments),
-        Command::Validate(arguments) => arguments.python.run("warpgait.validate", console),
-        Command::Export(arguments) => arguments.python.run("warpgait.export", console),
-        Command::View(arguments) => arguments.python.run("warpgait.view", console),
-        Command::Sweep(arguments) => arguments.python.run("warpgait.sweep", console),
+        Command::Validate(arguments) => arguments.python.run("warpgait.commands.validate", console),
+        Command::Export(arguments) => arguments.python.run("warpgait.commands.export", console),
+        Command::View(arguments) => arguments.python.run("warpgait.commands.view", console),
+        Command::Sweep(arguments) => arguments.python.run("warpgait.commands.sweep", console),
     }
 }

@@ -146,12 +146,12 @@ impl Document {
 
     /// An input error at a key, with file and line; for a missing key, the line of the table that lacks it.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
-        let at = match self.origin(key).0 {
-            Some(Origin::Line(line)) => format!("{}:{line}", self.file),
-            Some(Origin::Override(assignment)) => format!("--set {assignment}"),
-            None => self.file.clone(),
+        let (file, line) = match self.origin(key).0 {
+            Some(Origin::Line(line)) => (self.file.clone(), Some(*line)),
+            Some(Origin::Override(assignment)) => (format!("--set {assignment}"), None),
+            None => (self.file.clone(), None),
         };
-        Error::input(format!("{at}: {key}: {what}"))
+        Error::Value { file, line, key: key.to_owned(), what: what.to_string() }
     }
 
     /// Where the value at a key was set, or else the innermost of the tables and arrays around it; and whether there is a value.

@@ -151,6 +151,10 @@ pub struct Meta {
     pub schema: u32,
     /// Version of the program.
     pub warpgait_version: String,
+    /// The commit that the program was built from, `-dirty` if it had other changes, or `unknown`; empty in plans of version 0.1.0 and
+    /// before.
+    #[serde(default)]
+    pub warpgait_commit: String,
     /// RFC 3339.
     pub created: String,
     /// The space of the variables.

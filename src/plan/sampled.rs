@@ -12,6 +12,7 @@ use crate::ipopt::IterationRecord;
 use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
 use crate::planner::{Motion, Seconds};
+use crate::program;
 use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::{Ground, Patch};
 use crate::trajectory::Layout;
@@ -157,6 +158,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
     Meta {
         schema: PLAN_SCHEMA,
         warpgait_version: env!("CARGO_PKG_VERSION").into(),
+        warpgait_commit: program::commit().into(),
         created: rfc3339(SystemTime::now()),
         formulation: scenario.formulation(),
         sample_rate_hz: SAMPLES_A_STEP as f64 / model.layout.time_step,

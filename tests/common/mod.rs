@@ -121,6 +121,7 @@ pub fn standing() -> Plan {
         meta: Meta {
             schema: 1,
             warpgait_version: "0.1.0".into(),
+            warpgait_commit: String::new(),
             created: "2024-01-01T00:00:00Z".into(),
             formulation: Formulation::Direct,
             sample_rate_hz: 200.0,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import warpgait
-from warpgait.validate import main as validate
+from warpgait.commands.validate import main as validate
 
 SCENARIO = """
 schema = 1

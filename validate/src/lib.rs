@@ -7,21 +7,34 @@ mod arrays;
 mod check;
 mod command;
 mod error;
+mod scenario;
 mod solve;
 mod terrain;
 mod trajectory;
 
+use pyo3::prelude::*;
+
 /// `warpgait._native`
 #[pyo3::pymodule]
 mod _native {
+    use super::*;
+
     #[pymodule_export]
     use super::check::check_plan;
     #[pymodule_export]
     use super::command::run_command;
+    #[pymodule_export]
+    use super::scenario::{schema, terrain};
     #[pymodule_export]
     use super::solve::solve;
     #[pymodule_export]
     use super::terrain::Terrain;
     #[pymodule_export]
     use super::trajectory::{BaseMotion, FeetMotion, Trajectory, load};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        warpgait::program::built_from(option_env!("WARPGAIT_COMMIT"));
+        module.add("COMMIT", warpgait::program::commit())
+    }
 }

@@ -1,15 +1,14 @@
 //! Planning from Python: the pipeline of `warpgait solve` without the interpreter lock.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use pyo3::types::PyDict;
 use warpgait::pipeline::{self, Event};
-use warpgait::scenario;
 
-use crate::error::{InputError, exception};
+use crate::error::exception;
+use crate::scenario;
 use crate::trajectory::Trajectory;
 
 /// Plan the motion of a scenario and check it, as `warpgait solve` does.
@@ -26,18 +25,7 @@ pub fn solve(
     overrides: Option<&Bound<'_, PyDict>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Trajectory> {
-    let overrides = match overrides {
-        Some(overrides) => assignments(overrides)?,
-        None => Vec::new(),
-    };
-    let text = scenario.cast::<PyString>().ok().map(|text| text.to_str()).transpose()?;
-    let loaded = match text {
-        Some(text) if text.contains('\n') => {
-            scenario::load_text("scenario", text, Path::new("."), &overrides)
-        }
-        _ => scenario::load(&scenario.extract::<PathBuf>()?, &overrides),
-    };
-    let loaded = loaded.map_err(exception)?;
+    let loaded = scenario::load(scenario, overrides)?;
 
     let mut raised: Option<PyErr> = None;
     let outcome = py.detach(|| {
@@ -64,46 +52,4 @@ fn tell(py: Python<'_>, event: &Event, progress: Option<&Py<PyAny>>) -> PyResult
         progress.call1(py, (at.iteration, at.record.violation, at.record.objective))?;
     }
     Ok(())
-}
-
-/// `key=value` for each entry, the value in TOML.
-fn assignments(overrides: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
-    overrides
-        .iter()
-        .map(|(key, value)| {
-            let key: String = key.extract().map_err(|_| {
-                InputError::new_err(format!("overrides: the key {key} is no string, such as \"gait.kind\""))
-            })?;
-            Ok(format!("{key}={}", toml_value(&key, &value)?))
-        })
-        .collect()
-}
-
-fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
-    // A bool is an int too, so it comes first.
-    if value.is_instance_of::<PyBool>() {
-        return Ok(toml::Value::Boolean(value.extract()?));
-    }
-    if value.is_instance_of::<PyInt>() {
-        return Ok(toml::Value::Integer(value.extract()?));
-    }
-    if value.is_instance_of::<PyFloat>() {
-        return Ok(toml::Value::Float(value.extract()?));
-    }
-    if let Ok(text) = value.cast::<PyString>() {
-        return Ok(toml::Value::String(text.to_str()?.to_owned()));
-    }
-    // NumPy's scalars and arrays say what they are in Python's own types.
-    if value.hasattr("tolist")? {
-        return toml_value(key, &value.call_method0("tolist")?);
-    }
-    let refuse = || {
-        let what = format!("overrides: {key}: {value} is no bool, number, string, or list of these");
-        InputError::new_err(what)
-    };
-    let items = value.try_iter().map_err(|_| refuse())?;
-    if value.is_instance_of::<PyDict>() {
-        return Err(refuse());
-    }
-    Ok(toml::Value::Array(items.map(|item| toml_value(key, &item?)).collect::<PyResult<_>>()?))
 }

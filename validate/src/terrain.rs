@@ -9,7 +9,7 @@ use warpgait::heightfield::Heightfield;
 use crate::arrays::{Numbers, array, values};
 use crate::error::InputError;
 
-/// The ground that the plan was made for: a C² spline through the plan's heights, extended beyond their rectangle.
+/// The ground of a plan or a scenario: a C² spline through the heights, extended beyond their rectangle.
 #[pyclass(frozen, module = "warpgait")]
 pub struct Terrain(pub Arc<Heightfield>);
 

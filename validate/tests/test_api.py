@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,8 @@ import pytest
 from conftest import WALK
 
 import warpgait
-from warpgait import Ground, InputError, Plan, Robot, Scenario
-from warpgait.export import formats
+from warpgait import InputError, Plan, Robot, Scenario, Terrain
+from warpgait.commands.export import formats
 from warpgait.settings import Settings
 from warpgait.toml import table_text
 
@@ -24,7 +25,7 @@ def plan() -> Plan:
 
 
 def test_scenarios_are_made_of_keywords_dicts_texts_and_files(tmp_path: Path) -> None:
-    ground = Ground.formula("0.04*sin(5*x)*cos(4*y)", extent=(-1.5, 1.5, -1.5, 1.5), spacing=0.02)
+    ground = Terrain.formula("0.04*sin(5*x)*cos(4*y)", extent=(-1.5, 1.5, -1.5, 1.5), spacing=0.02)
     made = Scenario(
         formulation="direct", horizon=3.0, robot="anymal_c", terrain=ground, start=(0.0, 0.0), goal=np.array([0.3, 0.0])
     )
@@ -43,7 +44,7 @@ def test_set_returns_another_scenario(tmp_path: Path) -> None:
     assert first.to_dict()["goal"]["position"] == [0.3, 0.0] and "gait" not in first.to_dict()
     values = second.to_dict()
     assert values["gait"] == {"kind": "trot"} and values["goal"]["position"] == [0.4, 0.1] and values["horizon"] == 2.0
-    third = second.set("terrain", Ground.shape("flat", extent=[-1.0, 1.0, -1.0, 1.0])).set(
+    third = second.set("terrain", Terrain.shape("flat", extent=[-1.0, 1.0, -1.0, 1.0])).set(
         "robot", Robot("anymal_b", adhesive_feet=["LF"])
     )
     assert third.to_dict()["terrain"] == {"kind": "flat", "extent": [-1.0, 1.0, -1.0, 1.0]}
@@ -64,7 +65,7 @@ def test_an_array_is_a_ground(tmp_path: Path) -> None:
     y, x = np.mgrid[-1.5:1.5:61j, -1.5:1.5:61j]
     heights = 0.05 * np.sin(2 * x) + 0.02 * y
     for path in (None, tmp_path / "kept.npz"):
-        ground = Ground.array(heights, spacing=0.05, layout="y-up", path=path)
+        ground = Terrain.array(heights, spacing=0.05, layout="y-up", path=path)
         base = Scenario(formulation="direct", horizon=3.0, robot="anymal_c", start=(0.0, 0.0), goal=(0.2, 0.0), terrain=ground)
         found = base.set("solver.max_iterations", 2).solve()
         points = np.array([[0.3, -0.4], [-0.2, 0.5]])
@@ -72,7 +73,7 @@ def test_an_array_is_a_ground(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.terrain.height(points), exact, atol=2e-3)
     assert (tmp_path / "kept.npz").is_file()
     with pytest.raises(InputError, match="two dimensions"):
-        Ground.array(np.zeros(5), spacing=0.1)
+        Terrain.array(np.zeros(5), spacing=0.1)
 
 
 def test_paths_in_a_scenario_file_are_relative_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,6 +106,43 @@ def test_bad_values_are_refused_with_their_key(tmp_path: Path) -> None:
         Scenario.from_text("a = = 1").to_dict()
     with pytest.raises(InputError, match="is a value, not a table"):
         Scenario(horizon=2.0).set("horizon.length", 3.0).to_dict()
+
+
+def test_an_error_says_where_its_cause_is(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(f"{WALK}[gait]\nkind = 'moonwalk'\n")
+    with pytest.raises(InputError) as caught:
+        warpgait.solve(tmp_path / "s.toml")
+    error = caught.value
+    assert (error.file, error.line, error.key) == (str(tmp_path / "s.toml"), WALK.count("\n") + 2, "gait.kind")
+    assert str(error).startswith(f"{error.file}:{error.line}: gait.kind: ")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.file, again.line, again.key) == (str(error), error.file, error.line, error.key)
+    with pytest.raises(InputError) as caught:
+        warpgait.solve(tmp_path / "s.toml", overrides={"gait.kind": "slide"})
+    assert (caught.value.file, caught.value.line, caught.value.key) == ('--set gait.kind="slide"', None, "gait.kind")
+    with pytest.raises(InputError) as caught:
+        warpgait.load(tmp_path / "none.plan.npz")
+    assert caught.value.file == str(tmp_path / "none.plan.npz") and caught.value.key is None
+
+
+def test_a_terrain_is_evaluated_before_and_after_planning(plan: Plan, tmp_path: Path) -> None:
+    points = np.array([[0.3, -0.4], [-0.2, 0.5]])
+    made = Terrain.formula("0.04*sin(5*x)*cos(4*y)", extent=(-1.5, 1.5, -1.5, 1.5), spacing=0.02)
+    assert made.extent == (-1.5, 1.5, -1.5, 1.5)
+    np.testing.assert_allclose(made.height(points), 0.04 * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1]), atol=1e-4)
+    for other in (plan.terrain, Scenario.from_text(WALK).terrain):
+        np.testing.assert_array_equal(other.height(points), made.height(points))
+        np.testing.assert_array_equal(other.normal(points), made.normal(points))
+    # That of a plan is a terrain for other scenarios.
+    assert Scenario(terrain=plan.terrain).to_dict()["terrain"] == {
+        **Scenario.from_text(WALK).to_dict()["terrain"],
+        **plan.terrain.values,
+    }
+    array = Terrain.array(np.tile(np.linspace(0.0, 1.0, 41), (21, 1)), spacing=0.05, layout="y-up", origin=(5.0, 0.0))
+    np.testing.assert_allclose(array.height([[5.0, 0.0], [4.5, 0.2]]), [0.5, 0.25], atol=1e-9)
+    assert "steepest" in made._repr_html_() and "27°" in array._repr_html_()
+    with pytest.raises(InputError, match=r"terrain\.expression"):
+        Terrain.formula("0.1*", extent=(-1, 1, -1, 1)).height(points)
 
 
 def test_toml_is_read_as_it_was_written() -> None:

@@ -15,8 +15,8 @@ import pytest
 
 import crawl
 from warpgait import film
+from warpgait.commands.validate import main
 from warpgait.settings import MUJOCO_VERSION
-from warpgait.validate import main
 
 
 def test_a_good_plan_gives_three_files_and_exit_code_0(
@@ -96,7 +96,16 @@ def test_a_bug_is_not_a_verdict(
 
 
 def test_a_closed_standard_output_does_not_change_the_verdict(walk_plan: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path), "--no-pictures", "--quick"]
+    command = [
+        sys.executable,
+        "-m",
+        "warpgait.commands.validate",
+        str(walk_plan),
+        "-o",
+        str(tmp_path),
+        "--no-pictures",
+        "--quick",
+    ]
     run = subprocess.Popen([*command], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None and run.stderr is not None
     run.stdout.close()
@@ -116,7 +125,7 @@ def test_without_a_display_or_opengl_the_report_says_what_to_install(
 
 def test_a_missing_opengl_loses_only_the_pictures(walk_plan: Path, tmp_path: Path) -> None:
     """With this setting, MuJoCo itself cannot be imported."""
-    command = [sys.executable, "-m", "warpgait.validate", str(walk_plan), "-o", str(tmp_path), "--quick"]
+    command = [sys.executable, "-m", "warpgait.commands.validate", str(walk_plan), "-o", str(tmp_path), "--quick"]
     environment = dict(os.environ, MUJOCO_GL="osmesa", PYOPENGL_PLATFORM="no-such-platform")
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -150,7 +159,7 @@ def test_the_package_requires_the_version_of_mujoco_that_it_was_calibrated_with(
 
 def test_a_missing_mujoco_is_a_message(walk_plan: Path, tmp_path: Path) -> None:
     (tmp_path / "mujoco.py").write_text("raise ImportError('No module named mujoco')")
-    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from warpgait.validate import main; sys.exit(main([{str(walk_plan)!r}, '-o', {str(tmp_path)!r}]))"
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from warpgait.commands.validate import main; sys.exit(main([{str(walk_plan)!r}, '-o', {str(tmp_path)!r}]))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "pip install" in done.stderr and "Traceback" not in done.stderr

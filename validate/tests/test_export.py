@@ -14,10 +14,10 @@ from conftest import WALK
 
 import crawl
 import warpgait
-from warpgait.export import main
+from warpgait.commands.export import main
+from warpgait.commands.validate import main as validate
 from warpgait.motions import FORMATS, motion_of_plan, motion_of_replay
 from warpgait.plan import read_plan
-from warpgait.validate import main as validate
 
 
 @pytest.fixture

@@ -12,11 +12,11 @@ import pytest
 from conftest import WALK
 
 import crawl
+from warpgait.commands.validate import main
 from warpgait.errors import InputError
 from warpgait.film import ffmpeg
 from warpgait.model import find_model, model_file, robots_directories
 from warpgait.plan import read_plan
-from warpgait.validate import main
 
 QUICK = ["--no-pictures", "--quick"]
 
@@ -31,7 +31,7 @@ def _with_meta(source: Path, target: Path, **robot: Any) -> Path:
 
 
 def _run(words: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "warpgait.validate", *words]
+    command = [sys.executable, "-P", "-m", "warpgait.commands.validate", *words]
     return subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False, **options)
 
 
@@ -90,7 +90,7 @@ def test_other_commands_import_nothing_from_the_working_folder(
     (tmp_path / "walk.plan.npz").write_bytes(walk_plan.read_bytes())
     (tmp_path / "walk.toml").write_text(WALK)
     (tmp_path / "s.toml").write_text('scenario = "walk.toml"\n[values]\nsolver.max_iterations = [1]\n')
-    command = [sys.executable, "-P", "-m", f"warpgait.{words[0]}", *words[1:]]
+    command = [sys.executable, "-P", "-m", f"warpgait.commands.{words[0]}", *words[1:]]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and (tmp_path / written).is_file(), done.stderr
     assert not (tmp_path / "ran").exists()
@@ -169,7 +169,7 @@ def test_a_full_standard_output_is_an_error_and_a_closed_one_is_not(walk_plan: P
         assert "error: standard output: No space left on device" in done.stderr and "Traceback" not in done.stderr
     # The verdict is written all the same, and stays.
     assert json.loads((tmp_path / "walk.report.json").read_text())["verdict"] == "pass"
-    shell = f"'{sys.executable}' -P -m warpgait.validate \"$@\" >&-"
+    shell = f"'{sys.executable}' -P -m warpgait.commands.validate \"$@\" >&-"
     done = subprocess.run(["sh", "-c", shell, "sh", *words], stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr

@@ -13,7 +13,7 @@ import pytest
 
 import warpgait
 from warpgait.arrays import Array
-from warpgait.export import export
+from warpgait.commands.export import export
 from warpgait.geometry import rotation_from_wxyz
 from warpgait.model import find_model, indices, load_robot
 from warpgait.motions import FORMATS, Motion

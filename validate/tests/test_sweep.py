@@ -17,7 +17,8 @@ import pytest
 from conftest import WALK
 
 import warpgait
-from warpgait.sweep import main
+from warpgait import InputError
+from warpgait.commands.sweep import main
 from warpgait.sweeps import spec
 
 GRID = """
@@ -110,7 +111,7 @@ def test_time_and_memory_are_limited(folder: Path) -> None:
 
 def test_an_interruption_ends_the_processes_and_keeps_what_is_done(folder: Path) -> None:
     (folder / "s.toml").write_text('scenario = "walk.toml"\n[values]\nhorizon = [2.0, 200.0, 201.0, 202.0]\n')
-    command = [sys.executable, "-P", "-m", "warpgait.sweep", str(folder / "s.toml"), "--workers", "2"]
+    command = [sys.executable, "-P", "-m", "warpgait.commands.sweep", str(folder / "s.toml"), "--workers", "2"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 60
     while not list((folder / "s.sweep/cases").glob("*.json")) and time.monotonic() < deadline:
@@ -202,3 +203,40 @@ def test_text_in_values_is_only_shown(folder: Path) -> None:
     found: Any = (folder / "s.sweep/index.html").read_text()
     assert "<script" not in found and "&lt;script&gt;" in found
     assert [row["status"] for row in rows(folder)] == ["solved", "refused"]
+
+
+def test_the_function_sweeps_scenarios(folder: Path) -> None:
+    told: list[tuple[int, int]] = []
+    found = warpgait.sweep(
+        warpgait.Scenario.read(folder / "walk.toml"),
+        {"gait.kind": ["walk", "trot"], "goal.position": [(0.3, 0.0)]},
+        folder=folder / "out",
+        workers=2,
+        progress=lambda finished, count, _: told.append((finished, count)),
+    )
+    assert found.counts == {"solved": 2} and told == [(1, 2), (2, 2)] and found.folder == folder / "out"
+    assert [row["gait.kind"] for row in found.rows] == ["walk", "trot"]
+    assert [plan.passed for _, plan in found.plans()] == [True, True]
+    assert "2 solved" in repr(found) and "<iframe" in found._repr_html_()
+    # A file that says the same has the same cases, which have results.
+    again = warpgait.sweep(
+        folder / "walk.toml", {"gait.kind": ["walk", "trot"], "goal.position": [[0.3, 0.0]]}, folder=folder / "out"
+    )
+    assert again.rows == found.rows
+    with pytest.raises(InputError, match="folder: is missing"):
+        warpgait.sweep(warpgait.Scenario.read(folder / "walk.toml"), {"horizon": [2.0]})
+    with pytest.raises(InputError, match="values: are missing"):
+        warpgait.sweep(warpgait.Scenario())
+    with pytest.raises(InputError, match="count: is missing"):
+        warpgait.sweep(folder / "walk.toml", {"horizon": [2.0]}, kind="random")
+    with pytest.raises(InputError, match="kinds: unknown key"):
+        warpgait.sweep(folder / "walk.toml", {"horizon": [2.0]}, kinds="random")
+
+
+def test_every_case_has_a_process_of_its_own_and_those_share_the_start(folder: Path) -> None:
+    (folder / "s.toml").write_text('scenario = "walk.toml"\n[values]\nsolver.max_iterations = [1, 2, 3, 4, 5, 6]\n')
+    assert sweep(folder, "-q", "--workers", "1") == 0
+    results = [json.loads(path.read_text()) for path in (folder / "s.sweep/cases").iterdir()]
+    assert [result["status"] for result in results] == ["failed"] * 6
+    assert all(result["laws"] and len(result["path"]) == 24 and result["warpgait_commit"] for result in results)
+    assert all(float(row["memory_mb"]) < 300 for row in rows(folder))

@@ -19,12 +19,12 @@ from conftest import WALK
 
 import crawl
 import warpgait
-from warpgait import view
 from warpgait.archive import Archive
+from warpgait.commands import view
+from warpgait.commands.validate import main as validate
+from warpgait.commands.view import main
 from warpgait.motions import motion_of_plan
 from warpgait.plan import read_plan
-from warpgait.validate import main as validate
-from warpgait.view import main
 from warpgait.viewer.warping import warping_of
 
 TYPES = {"f4": "<f4", "u2": "<u2", "u1": "|u1"}

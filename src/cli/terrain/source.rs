@@ -105,9 +105,12 @@ impl SourceArguments {
 
     /// An error about a scenario that was made up, in terms of what was given.
     fn with_options(&self, error: Error) -> Error {
-        let Error::Input(message) = error else { return error };
-        // What precedes the key is a place in the scenario that was made up.
-        let mut what = message.find(": terrain.").map_or(message.clone(), |at| message[at + 2..].to_owned());
+        let mut what = match error {
+            Error::Input(message) => message,
+            // The place is in the scenario that was made up.
+            Error::Value { key, what, .. } => format!("{key}: {what}"),
+            other => return other,
+        };
         if let Some(rest) = what.strip_prefix("terrain.file: ") {
             // The name is said once.
             let name = format!("{:?}: ", self.input.file_name().unwrap_or_default());

@@ -1,7 +1,7 @@
 """Plans gaits, evaluates plans exactly, and replays them on full robot models in MuJoCo.
 
-A `Scenario` says what is to be planned, on a `Ground`, by a `Robot`. `solve` plans it and `load` reads a plan; both return a `Plan`, which is
-exact at any time, and which can be checked, replayed, exported and looked at. `write_terrain` writes an array as a ground for scenarios.
+A `Scenario` says what is to be planned, on a `Terrain`, by a `Robot`. `solve` plans it and `load` reads a plan; both return a `Plan`, which is
+exact at any time, and which can be checked, replayed, exported and looked at. `sweep` plans many scenarios. `write_terrain` writes an array as a ground for scenarios.
 `python -m warpgait` is the command `warpgait`.
 """
 
@@ -9,28 +9,32 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._native import BaseMotion, FeetMotion, Terrain
+    from ._native import BaseMotion, FeetMotion
     from .errors import InputError
     from .ground import write_terrain
-    from .plans import Check, Plan, Report, check, load, solve
+    from .plans import Check, Plan, Report, check, load, solve, sweep, validate
     from .plans import Plan as Trajectory
-    from .scenario import Ground, Robot, Scenario
+    from .scenario import Robot, Scenario
+    from .surface import Terrain
+    from .sweeps.run import SweepResult
 
 _PLACES = {
     "BaseMotion": "_native",
     "Check": "plans",
     "FeetMotion": "_native",
-    "Ground": "scenario",
     "InputError": "errors",
     "Plan": "plans",
     "Report": "plans",
     "Robot": "scenario",
     "Scenario": "scenario",
-    "Terrain": "_native",
+    "SweepResult": "sweeps.run",
+    "Terrain": "surface",
     "Trajectory": "plans",
     "check": "plans",
     "load": "plans",
     "solve": "plans",
+    "sweep": "plans",
+    "validate": "plans",
     "write_terrain": "ground",
 }
 """The module of each name. They are imported when first used: SciPy takes half a second, which `warpgait --help` need not wait for."""
@@ -39,17 +43,19 @@ __all__ = [
     "BaseMotion",
     "Check",
     "FeetMotion",
-    "Ground",
     "InputError",
     "Plan",
     "Report",
     "Robot",
     "Scenario",
+    "SweepResult",
     "Terrain",
     "Trajectory",
     "check",
     "load",
     "solve",
+    "sweep",
+    "validate",
     "write_terrain",
 ]
 

@@ -11,6 +11,9 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
+COMMIT: str
+"""The commit that the compiled part was built from, or `unknown`."""
+
 @final
 class BaseMotion:
     """The base at times of shape (…), in the world frame."""
@@ -69,7 +72,7 @@ class FeetMotion:
 
 @final
 class Terrain:
-    """The ground that the plan was made for: a C² spline through the plan's heights, extended beyond their rectangle."""
+    """The ground of a plan or a scenario: a C² spline through the heights, extended beyond their rectangle."""
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -142,6 +145,12 @@ def run_command(arguments: list[str], python: str | PathLike[str], file: str | P
     It writes to the standard output and error of the process, not to `sys.stdout`, and handles Ctrl-C itself. Processes of its own are run
     with the interpreter `python`; `file` is the compiled module.
     """
+
+def schema() -> str:
+    """The JSON Schema of scenario files, as `warpgait schema` prints it."""
+
+def terrain(scenario: str | PathLike[str], *, overrides: dict[str, Any] | None = None) -> Terrain:
+    """The ground of a scenario, as it is planned on. `scenario` and `overrides` are those of `solve`."""
 
 def solve(
     scenario: str | PathLike[str],

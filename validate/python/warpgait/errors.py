@@ -10,7 +10,14 @@ REPORT_SCHEMA = 1  # of NAME.report.json
 
 
 class InputError(ValueError):
-    """Something given to warpgait cannot be used. The message says what, where, and what to do."""
+    """Something given to warpgait cannot be used. The message says what, where, and what to do; the fields say where, as far as is known."""
+
+    def __init__(self, message: str = "", file: str | None = None, line: int | None = None, key: str | None = None) -> None:
+        """A message, and where its cause is."""
+        super().__init__(message)
+        self.file = file  # as it was named, or the override that set a value
+        self.line = line  # from 1
+        self.key = key  # of a scenario, such as gait.duty
 
 
 def error_page(plan: str, message: str) -> str:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import InputError
 from .files import write_bytes
-from .plan import Heightfield
+
+if TYPE_CHECKING:
+    from .plan import Heightfield
 
 LAYOUTS = ("picture", "y-up", "x-y", "grid-map")
 _MOST_CELLS = 4096 * 4096

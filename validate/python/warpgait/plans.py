@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -13,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._native import BaseMotion, FeetMotion, Terrain
+from ._native import BaseMotion, FeetMotion
 from .errors import InputError
 from .files import ensure_outputs
 from .scenario import Scenario
+from .surface import Terrain
 from .text import escape
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from .motions import Motion
     from .plan import Plan as Samples
     from .settings import Settings
+    from .sweeps.run import SweepResult
     from .validation import Validation
 
 Progress = Callable[[int, float, float], object]
@@ -55,7 +58,8 @@ class Plan:
     @property
     def terrain(self) -> Terrain:
         """The ground that the plan was made for."""
-        return self._trajectory.terrain
+        values = tomllib.loads(str(self.meta.get("scenario", ""))).get("terrain", {})
+        return Terrain(values, _known=self._trajectory.terrain)
 
     @property
     def solved(self) -> bool:
@@ -120,14 +124,14 @@ class Plan:
 
     def to(self, form: str, path: str | Path, rate: float | None = None, source: str = "plan") -> list[Path]:
         """Write the motion in a format of `warpgait export`; returns the files. `to_csv` and so on are short for it."""
-        from .export import chosen, export
+        from .commands.export import chosen, export
 
         return export(self.path, chosen(form), Path(path), source, rate)[0]
 
     def __getattr__(self, name: str) -> Any:
         """`to_FORMAT(path, rate=None, source="plan")` for every format."""
         if name.startswith("to_"):
-            from .export import formats
+            from .commands.export import formats
 
             form = name.removeprefix("to_")
             if form in formats():
@@ -160,7 +164,7 @@ class Plan:
 
     def view(self, path: str | Path | None = None) -> Page:
         """The page of `warpgait view`; a notebook shows it. With `path`, it is written there as well."""
-        from .view import page_text, write_page
+        from .commands.view import page_text, write_page
 
         if path is not None:
             write_page(self.path, Path(path))
@@ -313,6 +317,59 @@ def solve(
     if isinstance(scenario, Scenario):
         return (scenario.set(overrides) if overrides else scenario).solve(progress)
     return Plan(_native.solve(scenario, overrides=overrides, progress=progress))
+
+
+def validate(
+    plan: Plan | str | PathLike[str],
+    settings: Settings | None = None,
+    *,
+    folder: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Report:
+    """Replay a plan, or a plan file, on the full robot in MuJoCo, and judge it, as `warpgait validate` does; see `Plan.validate`."""
+    return (plan if isinstance(plan, Plan) else load(plan)).validate(settings, folder, progress)
+
+
+def sweep(
+    scenario: Scenario | str | PathLike[str],
+    values: Mapping[str, Any] | None = None,
+    *,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    scheduler: Any = None,
+    again: bool = False,
+    progress: Callable[[int, int, dict[str, Any]], object] | None = None,
+    **keys: Any,
+) -> SweepResult:
+    """Plan many scenarios that differ in some values, each in a process of its own, as `warpgait sweep` does.
+
+    `scenario` with `values` by dotted key: lists to choose from, or `{"from": 0.0, "to": 1.0, "count": 5}`; `keys` are the other keys of a
+    sweep's file, such as `kind="random", count=100, seed=0, time_limit=60.0`. Without `values`, `scenario` is the file of a sweep.
+    Results are written to `folder` (for files, `NAME.sweep` beside them); what has a result there is not planned again, but with `again`
+    what timed out or was killed. `scheduler` is a Dask scheduler's address, or a `distributed.Client`. `progress` is told how many cases have
+    a result, of how many, and the last result.
+    """
+    from .sweeps import spec
+    from .sweeps.run import run
+
+    file = None if isinstance(scenario, Scenario) else Path(scenario)
+    if values is None:
+        if file is None:
+            raise InputError("values: are missing; a scenario is swept over values of its keys")
+        made = spec.read(file)
+    else:
+        made = spec.of(
+            lambda: scenario if isinstance(scenario, Scenario) else Scenario.read(Path(scenario)), {"values": values, **keys}
+        )
+    if folder is None:
+        if file is None:
+            raise InputError("folder: is missing; where are the results to be written?")
+        folder = file.with_name(f"{file.stem}.sweep")
+    told = None if progress is None else lambda finished, count, _, result: progress(finished, count, result)
+    found = run(made, Path(folder), workers=workers, scheduler=scheduler, again=again, progress=told)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return found
 
 
 def check(plan: Plan | str | PathLike[str]) -> Check:

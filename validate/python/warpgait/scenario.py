@@ -2,70 +2,24 @@
 
 from __future__ import annotations
 
-import tempfile
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy.typing as npt
 
 from . import _native
 from .errors import InputError
 from .files import write_text
-from .ground import write_terrain
+from .surface import Terrain
+from .text import escape
 from .toml import table_text
 
 if TYPE_CHECKING:
     from .plans import Plan
 
 _MOST_TEXT = 1 << 20  # bytes of a scenario file that is read
-
-
-@dataclass(frozen=True)
-class Ground:
-    """What a scenario has as its terrain. `Plan.terrain` is the ground of a plan, which can be evaluated."""
-
-    values: Mapping[str, Any]  # of the table [terrain]
-    _kept: object = field(default=None, repr=False, compare=False)  # a folder that exists as long as this
-
-    @classmethod
-    def file(cls, path: str | Path, **values: Any) -> Ground:
-        """A heightmap: an image, an array, a grid or a mesh (docs/inputs.md). `values` are keys of [terrain], such as `spacing` in m."""
-        return cls({"kind": "heightmap", "file": str(Path(path).resolve()), **values})
-
-    @classmethod
-    def array(
-        cls,
-        heights: npt.ArrayLike,
-        *,
-        spacing: float,
-        layout: str = "picture",
-        origin: tuple[float, float] = (0.0, 0.0),
-        height_scale: float | None = None,
-        path: str | Path | None = None,
-        **values: Any,
-    ) -> Ground:
-        """Heights (R, C) in m, NaN where there is no data, `spacing` m apart; see `write_terrain` for `layout` and `origin`.
-
-        They are written to `path`, by default to a temporary file that is removed with this object.
-        """
-        kept = None if path is not None else tempfile.TemporaryDirectory(prefix="warpgait-")
-        target = Path(path) if path is not None else Path(kept.name) / "ground.npz"  # type: ignore[union-attr]
-        write_terrain(target, heights, spacing=spacing, layout=layout, origin=origin, height_scale=height_scale)
-        return cls({**cls.file(target).values, **values}, kept)
-
-    @classmethod
-    def formula(cls, expression: str, *, extent: Sequence[float], spacing: float | None = None) -> Ground:
-        """h(x, y) in m as text, such as `0.1*sin(2*x)*cos(y)`, over `extent` = x_min, x_max, y_min, y_max in m."""
-        return cls({"kind": "formula", "expression": expression, "extent": list(extent), "spacing": spacing})
-
-    @classmethod
-    def shape(cls, kind: str, **values: Any) -> Ground:
-        """One of the built-in shapes: flat, rippled, conic, hilly or pit, with keys of [terrain] such as `level`."""
-        return cls({"kind": kind, **values})
 
 
 @dataclass(frozen=True)
@@ -98,7 +52,7 @@ _SHORT = {"robot": "name", "gait": "kind", "start": "position", "goal": "positio
 
 def _table(key: str, value: Any) -> Any:
     """The table that a keyword argument stands for."""
-    if isinstance(value, Ground | Robot):
+    if isinstance(value, Terrain | Robot):
         return dict(value.values)
     return {_SHORT[key]: value} if key in _SHORT and not isinstance(value, Mapping) else value
 
@@ -106,15 +60,15 @@ def _table(key: str, value: Any) -> Any:
 class Scenario:
     """What is to be planned. It does not change; `set` returns another one.
 
-    `Scenario(terrain=Ground.shape("rippled"), robot="anymal_c", start=(0, 0), goal=(1, 0), gait="trot", horizon=10.0)` has the tables of a
-    scenario file as keyword arguments: dicts, `Ground` and `Robot`, or for `robot` a name, for `gait` a kind, for `start` and `goal` a
+    `Scenario(terrain=Terrain.shape("rippled"), robot="anymal_c", start=(0, 0), goal=(1, 0), gait="trot", horizon=10.0)` has the tables of a
+    scenario file as keyword arguments: dicts, `Terrain` and `Robot`, or for `robot` a name, for `gait` a kind, for `start` and `goal` a
     position (2,) in m. `Scenario.read` takes a file, and `Scenario.from_text` TOML.
     """
 
     def __init__(self, **tables: Any) -> None:
         """Values are judged when the scenario is solved; here only whether TOML has such values."""
         values = {"schema": 1} | {key: _table(key, value) for key, value in tables.items()}
-        self._kept = [value for value in tables.values() if isinstance(value, Ground)]
+        self._kept = [value for value in tables.values() if isinstance(value, Terrain)]
         self._text, self._path = table_text(values), None  # type: str, Path | None
         self._overrides: dict[str, Any] = {}
 
@@ -149,26 +103,31 @@ class Scenario:
     def set(self, key: str | Mapping[str, Any], value: Any = None) -> Scenario:
         """A scenario in which the value of a dotted key, such as `gait.duty`, is another; or the values of several, in a dict.
 
-        `terrain` takes a `Ground` and `robot` a `Robot` as a whole; `robot`, `gait`, `start` and `goal` take a name, a kind or a position.
+        `terrain` takes a `Terrain` and `robot` a `Robot` as a whole; `robot`, `gait`, `start` and `goal` take a name, a kind or a position.
         """
         changes = dict(key) if isinstance(key, Mapping) else {key: value}
         made = Scenario.__new__(Scenario)
         made._text, made._path, made._kept = self._text, self._path, list(self._kept)
         made._overrides = dict(self._overrides)
         for name, each in changes.items():
-            if isinstance(each, Ground | Robot):
+            if isinstance(each, Terrain | Robot):
                 made = made._with_table(name, each)
             else:
                 made._overrides[f"{name}.{_SHORT[name]}" if name in _SHORT else name] = each
         return made
 
-    def _with_table(self, name: str, part: Ground | Robot) -> Scenario:
+    def _with_table(self, name: str, part: Terrain | Robot) -> Scenario:
         """Replace a whole table."""
         values = self.to_dict()
         values[name] = dict(part.values)
         made = Scenario(**values)
-        made._kept = [*self._kept, *([part] if isinstance(part, Ground) else [])]
+        made._kept = [*self._kept, *([part] if isinstance(part, Terrain) else [])]
         return made
+
+    @property
+    def path(self) -> Path | None:
+        """The file that it was read from, if nothing was changed since."""
+        return None if self._overrides else self._path
 
     def to_dict(self) -> dict[str, Any]:
         """The values as given, without defaults; paths of files are absolute if this was read from a file. Raises `InputError`."""
@@ -176,10 +135,6 @@ class Scenario:
             values: dict[str, Any] = tomllib.loads(self._text)
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{self._path or 'scenario'}: not TOML: {error}") from error
-        if self._path is not None:
-            for table in ("terrain", "robot"):
-                if isinstance(values.get(table), dict) and isinstance(values[table].get("file"), str):
-                    values[table]["file"] = str(self._path.parent / values[table]["file"])
         for key, value in self._overrides.items():
             *way, last = key.split(".")
             place = values
@@ -188,6 +143,10 @@ class Scenario:
                 if not isinstance(place, dict):
                     raise InputError(f"{key}: {part} is a value, not a table")
             place[last] = deepcopy(value)
+        if self._path is not None:
+            for table in ("terrain", "robot"):
+                if isinstance(values.get(table), dict) and isinstance(values[table].get("file"), str):
+                    values[table]["file"] = str(self._path.parent / values[table]["file"])
         return values
 
     def text(self) -> str:
@@ -197,6 +156,13 @@ class Scenario:
     def save(self, path: str | Path) -> None:
         """Write a scenario file."""
         write_text(Path(path), self.text())
+
+    @property
+    def terrain(self) -> Terrain:
+        """The ground, as it is planned on."""
+        values = self.to_dict().get("terrain", {})
+        source = self._path if self._path is not None else self._text
+        return Terrain(values, _known=_native.terrain(source, overrides=self._overrides or None))
 
     def solve(self, progress: Callable[[int, float, float], object] | None = None) -> Plan:
         """Plan the motion, as `warpgait solve` does; see `warpgait.solve`."""
@@ -209,6 +175,10 @@ class Scenario:
         """Where it is from, and what was changed."""
         place = f"Scenario.read({str(self._path)!r})" if self._path is not None else f"Scenario.from_text({self._text!r})"
         return place + (f".set({self._overrides!r})" if self._overrides else "")
+
+    def _repr_html_(self) -> str:
+        """The text for notebooks."""
+        return f"<pre>{escape(self.text())}</pre>"
 
     def __eq__(self, other: object) -> bool:
         """Whether the values are the same."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .._native import COMMIT
 from ..arrays import Array, Bools
 from ..files import stem_of
 from ..laws import check
@@ -113,10 +114,12 @@ def certify(
     return {
         "program": "warpgait",
         "version": metadata.version("warpgait"),
+        "commit": COMMIT,
         "plan": {
             "file": plan.path.name,
             "sha256": plan.sha256,
             "warpgait_version": plan.meta.get("warpgait_version"),
+            "warpgait_commit": plan.meta.get("warpgait_commit") or "unknown",
             "created": plan.meta.get("created"),
             "formulation": plan.meta.get("formulation"),
             "robot": plan.robot.name,

@@ -1,38 +1,36 @@
-"""Runs cases in processes: so many at once, each within its limits, each result written as soon as it is there."""
+"""Runs cases in processes of this machine: so many at once, each result written as soon as it is there."""
 
 from __future__ import annotations
 
 import json
 import os
-import signal
+import queue
 import subprocess
 import sys
-import time
+import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..files import write_text
 from .spec import Case, Sweep
+from .worker import KILLED
 
-TIMED_OUT, KILLED = "timed out", "killed"
-_POLL = 0.02  # s
-_GRACE = 2.0  # s between asking a process to end and ending it
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # one a case; the cases share the cores
-
-
-@dataclass
-class _Running:
-    case: Case
-    process: subprocess.Popen[bytes]  # what it says fits into a pipe
-    started: float
+_POLL = 0.05  # s
+_GRACE = 4.0  # s, of a process that is asked to end
+Tell = Callable[[Case, dict[str, Any]], None]
 
 
 def case_file(folder: Path, case: Case) -> Path:
     """Where the result of a case is."""
     return folder / "cases" / f"{case.name}.json"
+
+
+def plan_file(folder: Path, case: Case) -> Path:
+    """Where the plan of a case is."""
+    return folder / "plans" / f"{case.name}.plan.npz"
 
 
 def result_of(folder: Path, case: Case) -> dict[str, Any] | None:
@@ -44,74 +42,92 @@ def result_of(folder: Path, case: Case) -> dict[str, Any] | None:
         return None
 
 
-def _start(sweep: Sweep, folder: Path, case: Case) -> _Running:
-    plan = folder / "plans" / f"{case.name}.plan.npz" if sweep.keep_plans else None
-    order = {
-        "scenario": str(sweep.scenario),
-        "values": dict(case.values),
-        "plan": None if plan is None else str(plan),
-        "memory_limit": sweep.memory_limit,
-        "time_limit": sweep.time_limit,
-    }
-    environment = os.environ | dict.fromkeys(_THREADS, "1")
-    command = [sys.executable, "-P", "-m", "warpgait.sweeps.worker"]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment)
-    assert process.stdin is not None
-    with suppress(BrokenPipeError), process.stdin as order_pipe:  # a broken one: it has ended, as its exit code will tell
-        order_pipe.write(json.dumps(order).encode())
-    process.stdin = None
-    return _Running(case, process, time.monotonic())
+def limits(sweep: Sweep) -> dict[str, Any]:
+    """The part of an order that is the same for all cases."""
+    return {"memory_limit": sweep.memory_limit, "time_limit": sweep.time_limit}
 
 
-def _ended(running: _Running, sweep: Sweep) -> dict[str, Any]:
-    """The result of a process that has ended by itself."""
-    output, errors = running.process.communicate()
-    try:
-        found = json.loads(output)
-        if isinstance(found, dict) and running.process.returncode == 0:
-            return found
-    except (ValueError, RecursionError):
-        pass
-    said = errors[-4000:].decode(errors="replace").strip().splitlines()
-    code = running.process.returncode
-    how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    memory = f"its memory was limited to {sweep.memory_limit:g} GiB"
-    return {"status": KILLED, "reason": f"the process ended with {how}; {memory}{'; ' + said[-1] if said else ''}"}
+def keep(sweep: Sweep, folder: Path, case: Case, result: dict[str, Any]) -> dict[str, Any]:
+    """Write the result of a case, with its values; returns it."""
+    plan = plan_file(folder, case)
+    kept = f"plans/{plan.name}" if sweep.keep_plans and plan.is_file() else None
+    result = {"values": dict(case.values), "number": case.number, **result, "plan": kept}
+    write_text(case_file(folder, case), json.dumps(result, indent=1) + "\n")
+    return result
 
 
-def _stop(process: subprocess.Popen[bytes]) -> None:
-    process.terminate()
-    try:
-        process.wait(_GRACE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-    process.communicate()
+class Planner:
+    """A process that plans one case after another; one that dies is replaced."""
+
+    def __init__(self) -> None:
+        """The process is started with the first case."""
+        self._process: subprocess.Popen[str] | None = None
+
+    def plan(self, order: dict[str, Any]) -> dict[str, Any]:
+        """The result of an order."""
+        if self._process is None or self._process.poll() is not None:
+            environment = os.environ | dict.fromkeys(_THREADS, "1")
+            command = [sys.executable, "-P", "-m", "warpgait.sweeps.worker"]
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            process.stdin.write(json.dumps(order) + "\n")
+            process.stdin.flush()
+            return dict(json.loads(process.stdout.readline()))
+        except (OSError, ValueError):
+            code = process.wait()
+            return {"status": KILLED, "reason": f"the process that plans ended with exit code {code}", "wall_seconds": 0.0}
+
+    def close(self) -> None:
+        """End the process, and the case that it plans."""
+        if self._process is not None:
+            with suppress(OSError):
+                self._process.stdin.close()  # type: ignore[union-attr]
+            try:
+                self._process.wait(_GRACE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()  # its case ends with it
+                self._process.wait()
 
 
-def run(sweep: Sweep, folder: Path, cases: Iterable[Case], workers: int, tell: Callable[[Case, dict[str, Any]], None]) -> None:
+def run(sweep: Sweep, folder: Path, cases: Iterable[Case], workers: int, tell: Tell) -> None:
     """Plan all cases; an exception, such as Ctrl-C, ends the processes and leaves the results that are there."""
-    waiting = list(cases)[::-1]
-    active: list[_Running] = []
+    waiting: queue.SimpleQueue[Case] = queue.SimpleQueue()
+    done: queue.SimpleQueue[tuple[Case, dict[str, Any]] | BaseException] = queue.SimpleQueue()
+    count = 0
+    for case in cases:
+        waiting.put(case)
+        count += 1
+    planners = [Planner() for _ in range(min(workers, count))]
+    stopping = threading.Event()
+
+    def work(planner: Planner) -> None:
+        try:
+            while not stopping.is_set():
+                case = waiting.get_nowait()
+                plan = str(plan_file(folder, case)) if sweep.keep_plans else None
+                done.put((case, planner.plan({**sweep.source, "values": dict(case.values), "plan": plan, **limits(sweep)})))
+        except queue.Empty:
+            pass
+        except BaseException as error:
+            done.put(error)
+
+    threads = [threading.Thread(target=work, args=[planner], daemon=True) for planner in planners]
     try:
-        while waiting or active:
-            while waiting and len(active) < workers:
-                active.append(_start(sweep, folder, waiting.pop()))
-            for running in list(active):
-                seconds = time.monotonic() - running.started
-                if running.process.poll() is not None:
-                    result = _ended(running, sweep)
-                elif seconds > sweep.time_limit:
-                    _stop(running.process)
-                    result = {"status": TIMED_OUT, "reason": f"not done after {sweep.time_limit:g} s"}
-                else:
-                    continue
-                active.remove(running)
-                plan = folder / "plans" / f"{running.case.name}.plan.npz"
-                result["plan"] = f"plans/{plan.name}" if sweep.keep_plans and plan.is_file() else None
-                result = {"values": dict(running.case.values), "number": running.case.number, "wall_seconds": seconds, **result}
-                write_text(case_file(folder, running.case), json.dumps(result, indent=2) + "\n")
-                tell(running.case, result)
-            time.sleep(_POLL)
+        for thread in threads:
+            thread.start()
+        for _ in range(count):
+            found = done.get()
+            if isinstance(found, BaseException):
+                raise found
+            tell(found[0], keep(sweep, folder, *found))
     finally:
-        for running in active:
-            _stop(running.process)
+        stopping.set()
+        while any(thread.is_alive() for thread in threads):
+            for planner in planners:  # again, for a thread that had just begun with a case
+                planner.close()
+            for thread in threads:
+                thread.join(_POLL)
+        for planner in planners:
+            planner.close()

@@ -20,8 +20,8 @@ import itertools
 import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +59,8 @@ class Range:
 class Sweep:
     """What is to be planned."""
 
-    path: Path
-    scenario: Path
+    scenario: Scenario
+    inputs: tuple[Path, ...]  # files that it was read from
     kind: str
     count: int  # random
     seed: int
@@ -69,10 +69,15 @@ class Sweep:
     keep_plans: bool
     values: Mapping[str, list[Any] | Range]
 
+    @property
+    def source(self) -> dict[str, str]:
+        """The scenario, for a process of this machine: its file or its text."""
+        path = self.scenario.path
+        return {"scenario": str(path)} if path is not None else {"text": self.scenario.text()}
+
     def cases(self) -> list[Case]:
         """All cases, the same every time. Raises `InputError`."""
-        scenario = Scenario.read(self.scenario)
-        known = scenario.to_dict()
+        known = self.scenario.to_dict()
         files = [known.get(table, {}).get("file") for table in ("terrain", "robot")]
         digests = [
             hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file is not None and Path(file).is_file()
@@ -88,7 +93,7 @@ class Sweep:
     def _grid(self) -> Iterator[dict[str, Any]]:
         each = [v if isinstance(v, list) else np.linspace(v.first, v.last, v.count or 2).tolist() for v in self.values.values()]
         if math.prod(len(values) for values in each) > _MOST_CASES:
-            raise InputError(f"{self.path}: values: more than {_MOST_CASES} combinations")
+            raise InputError(f"{self.inputs[0] if self.inputs else 'sweep'}: values: more than {_MOST_CASES} combinations")
         for chosen in itertools.product(*each):
             yield dict(zip(self.values, chosen, strict=True))
 
@@ -115,11 +120,18 @@ def _number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
+def _plain(value: Any) -> Any:
+    """A value as a file would have it: NumPy's and tuples as numbers and lists."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
 def _choices(where: str, value: Any, grid: bool) -> list[Any] | Range:
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         if not value:
             raise InputError(f"{where}: has no value to choose from")
-        return value
+        return [_plain(each) for each in value]
     if not isinstance(value, dict):
         raise InputError(f"{where}: {value!r}: expected a list of values, or {{ from = …, to = …, count = … }}")
     if not set(value) <= _RANGE or not _number(value.get("from")) or not _number(value.get("to")):
@@ -128,6 +140,12 @@ def _choices(where: str, value: Any, grid: bool) -> list[Any] | Range:
     if grid and (not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= _MOST_CASES):
         raise InputError(f"{where}: count: in a grid, a range says how many values it has, 1 or more")
     return Range(float(value["from"]), float(value["to"]), count if grid else None)
+
+
+def _refuse_unknown(table: Mapping[str, Any], where: str) -> None:
+    for key in table:
+        if key not in _KEYS:
+            raise InputError(f"{where}{key}: unknown key; allowed here: {', '.join(_KEYS)}")
 
 
 def read(path: Path) -> Sweep:
@@ -140,36 +158,43 @@ def read(path: Path) -> Sweep:
         table = tomllib.loads(content.decode())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read as a sweep: {error}") from error
-    for key in table:
-        if key not in _KEYS:
-            raise InputError(f"{path}: {key}: unknown key; allowed here: {', '.join(_KEYS)}")
+    _refuse_unknown(table, f"{path}: ")
+    name = table.pop("scenario", None)
+    if not isinstance(name, str):
+        raise InputError(f"{path}: scenario: expected the name of a scenario file, relative to this file")
+    scenario = path.parent / name
+    made = of(lambda: Scenario.read(scenario), table, f"{path}: ")
+    return replace(made, inputs=(path, scenario))
+
+
+def of(scenario: Callable[[], Scenario], table: Mapping[str, Any], where: str = "") -> Sweep:
+    """A sweep over a scenario, with the other keys of the file; raises `InputError`, each message with `where` in front."""
+    _refuse_unknown(table, where)
 
     def limited(key: str, default: float, low: float, high: float, whole: bool = False) -> float:
         value = table.get(key, default)
         if not _number(value) or not low <= value <= high or (whole and not isinstance(value, int)):
-            raise InputError(f"{path}: {key}: {value!r}: expected a {'whole ' if whole else ''}number from {low:g} to {high:g}")
+            raise InputError(f"{where}{key}: {value!r}: expected a {'whole ' if whole else ''}number from {low:g} to {high:g}")
         return float(value)
 
-    kind, scenario, keep = table.get("kind", "grid"), table.get("scenario"), table.get("keep_plans", True)
+    kind, keep = table.get("kind", "grid"), table.get("keep_plans", True)
     if kind not in KINDS:
-        raise InputError(f"{path}: kind: {kind!r}: expected {' or '.join(KINDS)}")
-    if not isinstance(scenario, str):
-        raise InputError(f"{path}: scenario: expected the name of a scenario file, relative to this file")
+        raise InputError(f"{where}kind: {kind!r}: expected {' or '.join(KINDS)}")
     if not isinstance(keep, bool):
-        raise InputError(f"{path}: keep_plans: {keep!r}: expected true or false")
+        raise InputError(f"{where}keep_plans: {keep!r}: expected true or false")
     if kind == "random" and "count" not in table:
-        raise InputError(f"{path}: count: is missing; how many cases to draw")
+        raise InputError(f"{where}count: is missing; how many cases to draw")
     values = table.get("values")
-    if not isinstance(values, dict) or not values:
-        raise InputError(f"{path}: values: expected a table with keys of the scenario, each with what to choose from")
+    if not isinstance(values, Mapping) or not values:
+        raise InputError(f"{where}values: expected a table with keys of the scenario, each with what to choose from")
     return Sweep(
-        path=path,
-        scenario=path.parent / scenario,
+        scenario=scenario(),
+        inputs=(),
         kind=kind,
         count=int(limited("count", 1, 1, _MOST_CASES, whole=True)),
         seed=int(limited("seed", 0, 0, 2**63, whole=True)),
         time_limit=limited("time_limit", 300.0, 1.0, 1e6),
         memory_limit=limited("memory_limit", 2.0, 0.1, 1024.0),
         keep_plans=keep,
-        values={key: _choices(f"{path}: values.{key}", value, kind == "grid") for key, value in _flat(values)},
+        values={key: _choices(f"{where}values.{key}", value, kind == "grid") for key, value in _flat(values)},
     )

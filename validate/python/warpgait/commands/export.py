@@ -1,4 +1,4 @@
-"""`python -m warpgait.export P.plan.npz --to FORMAT`: the motion of a plan, or of its replay, for trainers, robots and viewers.
+"""`warpgait export P.plan.npz --to FORMAT`: the motion of a plan, or of its replay, for trainers, robots and viewers.
 
 Exit code 0: written; 2: bad input, something needed is missing, or a file or standard output cannot be written.
 """
@@ -10,14 +10,14 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .console import answer, emit, run
-from .errors import InputError
-from .files import ensure_outputs, stem_of
-from .settings import without_opengl
-from .text import visible
+from ..console import answer, emit, run
+from ..errors import InputError
+from ..files import ensure_outputs, stem_of
+from ..settings import without_opengl
+from ..text import visible
 
 if TYPE_CHECKING:
-    from .motions import Format, Motion
+    from ..motions import Format, Motion
 
 _GROUND = ".ground.npz"
 
@@ -51,7 +51,7 @@ def formats() -> dict[str, Format]:
     """The registry; a missing MuJoCo is an `InputError`."""
     try:
         with without_opengl():
-            from .motions import FORMATS
+            from ..motions import FORMATS
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco numpy scipy") from error
     return FORMATS
@@ -68,9 +68,9 @@ def chosen(name: str | None) -> Format:
 
 def motion_for(plan: Path, target: Format, source: str, rate: float | None) -> Motion:
     """The motion that a format is to have; raises `InputError`, also if the robot has no joints and the format needs them."""
-    from .model import available_models
-    from .motions import motion_of_plan, motion_of_replay
-    from .plan import read_plan
+    from ..model import available_models
+    from ..motions import motion_of_plan, motion_of_replay
+    from ..plan import read_plan
 
     loaded = read_plan(plan)
     if target.joints and loaded.robot.name not in available_models():
@@ -87,7 +87,7 @@ def export(
     plan: Path, target: Format, output: Path | None = None, source: str = "plan", rate: float | None = None
 ) -> tuple[list[Path], Motion]:
     """Write a motion; returns the files, and the motion."""
-    from .ground import write_heightfield
+    from ..ground import write_heightfield
 
     output = output or plan.parent / f"{stem_of(plan)}{target.ending}"
     motion = motion_for(plan, target, source, rate)

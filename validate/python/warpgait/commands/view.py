@@ -1,4 +1,4 @@
-"""`python -m warpgait.view P.plan.npz`: a page of the plan, to look at and to send to others; it needs no network.
+"""`warpgait view P.plan.npz`: a page of the plan, to look at and to send to others; it needs no network.
 
 Exit code 0: written; 2: bad input, something needed is missing, or a file or standard output cannot be written.
 """
@@ -12,11 +12,11 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from .console import answer, emit, run
-from .errors import InputError
-from .files import ensure_outputs, stem_of, write_text
-from .settings import without_opengl
-from .text import visible
+from ..console import answer, emit, run
+from ..errors import InputError
+from ..files import ensure_outputs, stem_of, write_text
+from ..settings import without_opengl
+from ..text import visible
 
 _DISPLAYS = "DISPLAY", "WAYLAND_DISPLAY"  # without one of them, there is no browser to open on Linux
 
@@ -42,7 +42,7 @@ def page_text(plan: Path) -> str:
     """The page of a plan; raises `InputError`."""
     try:
         with without_opengl():
-            from .viewer.page import page_of
+            from ..viewer.page import page_of
     except ImportError as error:
         raise InputError(f"a Python package is missing: {error}. Run: pip install mujoco numpy scipy") from error
     return page_of(plan)

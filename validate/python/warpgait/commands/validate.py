@@ -1,4 +1,4 @@
-"""`python -m warpgait.validate P.plan.npz`: will the robot walk it?
+"""`warpgait validate P.plan.npz`: will the robot walk it?
 
 Writes P.report.json, P.report.html and P.replay.npz beside the plan, or into --output. Exit code 0: trackable (pass or marginal); 1: not
 trackable; 2: bad input, something needed is missing, or standard output cannot be written. Reports of an earlier run are replaced by the error
@@ -16,14 +16,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .console import ERROR, INTERRUPTED, OutputError, complain, emit, run
-from .errors import InputError, error_page, error_report
-from .files import ensure_outputs, stem_of, write_text
-from .settings import MUJOCO_VERSION, Disturbance, Settings, without_opengl
-from .text import visible
+from ..console import ERROR, INTERRUPTED, OutputError, complain, emit, run
+from ..errors import InputError, error_page, error_report
+from ..files import ensure_outputs, stem_of, write_text
+from ..settings import MUJOCO_VERSION, Disturbance, Settings, without_opengl
+from ..text import visible
 
 if TYPE_CHECKING:
-    from .validation import Validation
+    from ..validation import Validation
 
 # MuJoCo and daqp are imported late, so that a missing package gives a message instead of a traceback.
 
@@ -171,7 +171,7 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
     """Read the plan, replay it, write the files, and print the verdict; returns the exit code."""
     try:
         with without_opengl():
-            from . import plan, validation
+            from .. import plan, validation
     except ImportError as error:
         packages = f"mujoco=={MUJOCO_VERSION} daqp numpy scipy"
         raise InputError(f"a Python package is missing: {error}. Run: pip install {packages}") from error
@@ -215,7 +215,7 @@ def _inputs(options: argparse.Namespace) -> list[Path]:
 
 def _print(options: argparse.Namespace, folder: Path, found: Validation) -> None:
     """The verdict on standard output, as JSON or for people."""
-    from . import report
+    from .. import report
 
     if options.json:
         emit(json.dumps(report.as_dict(found), allow_nan=False))
@@ -228,7 +228,7 @@ def _print(options: argparse.Namespace, folder: Path, found: Validation) -> None
 
 def _write(options: argparse.Namespace, folder: Path, found: Validation, say: Callable[[str], None]) -> None:
     """The report, the replay, and pictures and film as asked for."""
-    from . import film, page, report
+    from .. import film, page, report
 
     stem = stem_of(options.plan)
     pictures: list[tuple[float, bytes]] = []

@@ -1,0 +1,1 @@
+"""The commands of `warpgait` that are written in Python: `validate`, `export`, `view` and `sweep`, one module each."""
