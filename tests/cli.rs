@@ -47,9 +47,10 @@ fn help_and_usage() {
         let (code, out, _) = warpgait(folder.path(), &["terrain", command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
-    for command in
-        ["init", "schema", "solve", "map", "check", "bench", "validate", "export", "view", "sweep", "robot"]
-    {
+    for command in [
+        "init", "schema", "solve", "map", "check", "bench", "validate", "export", "view", "sweep", "atlas",
+        "dataset", "robot",
+    ] {
         let (code, out, _) = warpgait(folder.path(), &[command, "--help"]);
         assert!(code == 0 && out.contains("Examples:"), "{command}: {out}");
     }
@@ -223,6 +224,10 @@ fn validate_runs_python() {
 
     let (_, out, _) = validate(&["sweep", "a.toml", "--shard", "1/2"]);
     assert_eq!(out.trim(), "-P -m warpgait.commands.sweep a.toml --shard 1/2");
+    let (_, out, _) = validate(&["atlas", "a.png", "--robot", "go1"]);
+    assert_eq!(out.trim(), "-P -m warpgait.commands.atlas a.png --robot go1");
+    let (_, out, _) = validate(&["dataset", "-o", "walks", "--count", "3", "--json"]);
+    assert_eq!(out.trim(), "-P -m warpgait.commands.dataset -o walks --count 3 --json");
     let (_, out, _) = validate(&["view", "a.plan.npz", "--html", "a.html"]);
     assert_eq!(out.trim(), "-P -m warpgait.commands.view a.plan.npz --html a.html");
 

@@ -4,9 +4,11 @@
 //! JSON object. Exit codes: 0 all is well; 1 a plan that is not solved or fails a check; 2 bad input or usage, nothing
 //! written, or standard output cannot be written; 130 interrupted. A closed standard output is no error.
 
+mod atlas;
 mod bench;
 mod check;
 mod console;
+mod dataset;
 mod ending;
 mod export;
 mod figures;
@@ -43,6 +45,8 @@ Examples:
   warpgait terrain show scan.npy --spacing 0.04     draw a ground before planning on it
   warpgait map hill.toml              build and judge the warp map alone
   warpgait sweep hills.toml           plan many scenarios, each in a process of its own
+  warpgait atlas scan.png --robot go1 --spacing 0.04 --height-scale 1    where the robot can start
+  warpgait dataset -o walks --count 100             motions for training
   warpgait bench table1 --quick       a few cases of the paper's Table I
   warpgait solve --help               options and examples of one command
 
@@ -91,6 +95,10 @@ enum Command {
     View(view::ViewArguments),
     /// Plan many scenarios that differ in some values (needs the Python package)
     Sweep(sweep::SweepArguments),
+    /// Map where on a ground a robot can start, and in which direction (needs the Python package)
+    Atlas(atlas::AtlasArguments),
+    /// Make motions over random ground for training, with a card (needs the Python package)
+    Dataset(dataset::DatasetArguments),
 }
 
 /// Runs the program with the arguments of the process.
@@ -146,6 +154,8 @@ impl Command {
             Command::Export(arguments) => arguments.python.has_json(),
             Command::View(arguments) => arguments.python.has_json(),
             Command::Sweep(arguments) => arguments.python.has_json(),
+            Command::Atlas(arguments) => arguments.python.has_json(),
+            Command::Dataset(arguments) => arguments.python.has_json(),
             Command::Robot(arguments) => arguments.has_json(),
             _ => false,
         }
@@ -167,5 +177,7 @@ fn execute(command: Command, console: &Console) -> Result<Ending> {
         Command::Export(arguments) => arguments.python.run("warpgait.commands.export", console),
         Command::View(arguments) => arguments.python.run("warpgait.commands.view", console),
         Command::Sweep(arguments) => arguments.python.run("warpgait.commands.sweep", console),
+        Command::Atlas(arguments) => arguments.python.run("warpgait.commands.atlas", console),
+        Command::Dataset(arguments) => arguments.python.run("warpgait.commands.dataset", console),
     }
 }

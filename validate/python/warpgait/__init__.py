@@ -1,7 +1,8 @@
 """Plans gaits, evaluates plans exactly, and replays them on full robot models in MuJoCo.
 
 A `Scenario` says what is to be planned, on a `Terrain`, by a `Robot`. `solve` plans it and `load` reads a plan; both return a `Plan`, which is
-exact at any time, and which can be checked, replayed, exported and looked at. `sweep` plans many scenarios. `write_terrain` writes an array as a ground for scenarios.
+exact at any time, and which can be checked, replayed, exported and looked at. `sweep` plans many
+scenarios, `atlas` maps where a robot can start, and `dataset` makes motions for training. `write_terrain` writes an array as a ground for scenarios.
 `python -m warpgait` is the command `warpgait`.
 """
 
@@ -16,9 +17,12 @@ if TYPE_CHECKING:
     from .plans import Plan as Trajectory
     from .scenario import Robot, Scenario
     from .surface import Terrain
+    from .sweeps.atlas import Atlas, atlas
+    from .sweeps.dataset import Dataset, dataset
     from .sweeps.run import SweepResult
 
 _PLACES = {
+    "Atlas": "sweeps.atlas",
     "BaseMotion": "_native",
     "Check": "plans",
     "FeetMotion": "_native",
@@ -30,7 +34,10 @@ _PLACES = {
     "SweepResult": "sweeps.run",
     "Terrain": "surface",
     "Trajectory": "plans",
+    "Dataset": "sweeps.dataset",
+    "atlas": "sweeps.atlas",
     "check": "plans",
+    "dataset": "sweeps.dataset",
     "load": "plans",
     "solve": "plans",
     "sweep": "plans",
@@ -40,8 +47,10 @@ _PLACES = {
 """The module of each name. They are imported when first used: SciPy takes half a second, which `warpgait --help` need not wait for."""
 
 __all__ = [
+    "Atlas",
     "BaseMotion",
     "Check",
+    "Dataset",
     "FeetMotion",
     "InputError",
     "Plan",
@@ -51,7 +60,9 @@ __all__ = [
     "SweepResult",
     "Terrain",
     "Trajectory",
+    "atlas",
     "check",
+    "dataset",
     "load",
     "solve",
     "sweep",

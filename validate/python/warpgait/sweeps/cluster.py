@@ -46,20 +46,25 @@ def _packed(scenario: Scenario, files: dict[str, bytes]) -> str:
     return Scenario.from_dict(values).text()
 
 
-def plan_case(order: dict[str, Any], files: dict[str, bytes]) -> tuple[dict[str, Any], bytes | None]:
-    """On a worker: the result of an order, and the plan. Each thread has a process that plans."""
+def plan_case(order: dict[str, Any], files: dict[str, bytes]) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """On a worker: the result of an order, and the files that were written. Each thread has a process that plans."""
     if not hasattr(_local, "planner"):
         _local.planner = Planner()
     with tempfile.TemporaryDirectory(prefix="warpgait-") as place:
         for name, content in files.items():
             (Path(place) / name).write_bytes(content)
-        scenario, plan = Path(place) / "scenario.toml", Path(place) / "plan.npz"
+        scenario, output = Path(place) / "scenario.toml", Path(place) / "output"
         scenario.write_text(order["text"], encoding="utf-8")
-        here: dict[str, Any] = {"scenario": str(scenario), "values": {}, "plan": str(plan) if order["plan"] else None}
+        here: dict[str, Any] = {
+            "scenario": str(scenario),
+            "values": {},
+            "plan": str(output / order["plan"]) if order["plan"] else None,
+        }
         result = _local.planner.plan({**order, **here})
         if isinstance(result.get("reason"), str):
             result["reason"] = result["reason"].replace(f"{place}/", "")
-        return result, plan.read_bytes() if plan.is_file() else None
+        written = [path for path in output.rglob("*") if path.is_file()]
+        return result, {str(path.relative_to(output)): path.read_bytes() for path in written}
 
 
 def run(sweep: Sweep, folder: Path, cases: Iterable[Case], scheduler: Any, tell: Tell) -> None:
@@ -93,7 +98,9 @@ def _run(distributed: Any, client: Any, sweep: Sweep, folder: Path, cases: list[
     def submit() -> None:
         case = waiting.pop()
         files: dict[str, bytes] = {}
-        order = {"text": _packed(sweep.scenario.set(case.values), files), "plan": sweep.keep_plans, **limits(sweep)}
+        order: dict[str, Any] = {"text": _packed(sweep.scenario.set(case.values), files), "plan": None, **limits(sweep)}
+        if sweep.keep_plans:
+            order["plan"] = str(plan_file(Path(), case))
         for name, content in files.items():
             if name not in sent:
                 sent[name] = client.scatter(content, broadcast=True, hash=False)
@@ -111,10 +118,10 @@ def _run(distributed: Any, client: Any, sweep: Sweep, folder: Path, cases: list[
         while running:
             future = next(completed)
             case = running.pop(future)
-            result, plan = _outcome(distributed, client, future, lost)
-            if plan is not None:
-                plan_file(folder, case).parent.mkdir(parents=True, exist_ok=True)
-                write_bytes(plan_file(folder, case), plan)
+            result, written = _outcome(distributed, client, future, lost)
+            for name, content in written.items():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                write_bytes(folder / name, content)
             tell(case, keep(sweep, folder, case, result))
             future.release()
             refill()
@@ -125,13 +132,13 @@ def _run(distributed: Any, client: Any, sweep: Sweep, folder: Path, cases: list[
             client.cancel(list(running), force=True)
 
 
-def _outcome(distributed: Any, client: Any, future: Any, lost: InputError) -> tuple[dict[str, Any], bytes | None]:
+def _outcome(distributed: Any, client: Any, future: Any, lost: InputError) -> tuple[dict[str, Any], dict[str, bytes]]:
     if future.status == "finished":
         return future.result()  # type: ignore[no-any-return]
     if future.status != "error" or client.status != "running":
         raise lost
     error = future.exception()
     if isinstance(error, distributed.KilledWorker):
-        return {"status": KILLED, "reason": f"its workers died: {error}".splitlines()[0], "wall_seconds": 0.0}, None
+        return {"status": KILLED, "reason": f"its workers died: {error}".splitlines()[0], "wall_seconds": 0.0}, {}
     reason = f"the worker refused it: {type(error).__name__}: {error}"
-    return {"status": REFUSED if isinstance(error, InputError) else KILLED, "reason": reason, "wall_seconds": 0.0}, None
+    return {"status": REFUSED if isinstance(error, InputError) else KILLED, "reason": reason, "wall_seconds": 0.0}, {}

@@ -44,7 +44,12 @@ def result_of(folder: Path, case: Case) -> dict[str, Any] | None:
 
 def limits(sweep: Sweep) -> dict[str, Any]:
     """The part of an order that is the same for all cases."""
-    return {"memory_limit": sweep.memory_limit, "time_limit": sweep.time_limit}
+    return {
+        "memory_limit": sweep.memory_limit,
+        "time_limit": sweep.time_limit,
+        "replay": sweep.replay,
+        "export": sweep.export,
+    }
 
 
 def keep(sweep: Sweep, folder: Path, case: Case, result: dict[str, Any]) -> dict[str, Any]:

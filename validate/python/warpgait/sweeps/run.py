@@ -66,12 +66,13 @@ def run(
     scheduler: Any = None,
     shard: tuple[int, int] = (0, 1),
     again: bool = False,
+    one_first: bool = False,
     begin: Callable[[int, int], object] | None = None,
     progress: Progress | None = None,
 ) -> SweepResult:
     """Plan the cases, or the part `shard` = (which, of how many), that have no result in `folder`; with `again` also those that timed out.
 
-    `begin` is told how many cases have results, of how many; `progress` the same after each, with the case and its result. Ctrl-C is no
+    With `one_first`, the others wait for the first case, in which what they share is built: the map. `begin` is told how many cases have results, of how many; `progress` the same after each, with the case and its result. Ctrl-C is no
     exception here: the result says so, and has what was done. Raises `InputError`, also when a scheduler is lost.
     """
     workers = (os.cpu_count() or 1) if workers is None else workers
@@ -100,11 +101,13 @@ def run(
     interrupted = False
     try:
         if scheduler is None:
-            pool.run(sweep, folder, left, workers, tell)
+            first = 1 if one_first and workers > 1 else 0
+            pool.run(sweep, folder, left[:first], 1, tell)
+            pool.run(sweep, folder, left[first:], workers, tell)
         elif left:
             cluster.run(sweep, folder, left, scheduler, tell)
     except KeyboardInterrupt:
         interrupted = True
     finally:
-        written = results.write(folder, title, cases, list(sweep.values))
+        written = results.write(folder, title, cases, sweep.keys)
     return SweepResult(folder, results.rows_of(folder, mine), len(mine), written, interrupted)

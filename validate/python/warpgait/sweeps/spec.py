@@ -7,6 +7,8 @@ seed = 0                    # random
 time_limit = 300.0          # s, of a case
 memory_limit = 2.0          # GiB, of a case
 keep_plans = true
+replay = false              # replay good plans on the full robot, as `warpgait validate --quick` does
+export = "isaaclab"         # write the motions of plans that are good, and tracked where they are replayed, in this format
 
 [values]                    # keys of the scenario
 gait.kind = ["walk", "trot"]                            # one of these
@@ -21,7 +23,7 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,7 @@ from ..errors import InputError
 from ..scenario import Scenario
 
 KINDS = ("grid", "random")
-_KEYS = ("scenario", "kind", "count", "seed", "time_limit", "memory_limit", "keep_plans", "values")
+_KEYS = ("scenario", "kind", "count", "seed", "time_limit", "memory_limit", "keep_plans", "replay", "export", "values")
 _RANGE = {"from", "to", "count"}
 _MOST_CASES = 1_000_000
 _MOST_TEXT = 1 << 20  # bytes
@@ -61,13 +63,21 @@ class Sweep:
 
     scenario: Scenario
     inputs: tuple[Path, ...]  # files that it was read from
-    kind: str
-    count: int  # random
-    seed: int
+    kind: str  # grid or random, by `values`; listed, one by one
     time_limit: float  # s
     memory_limit: float  # GiB
-    keep_plans: bool
-    values: Mapping[str, list[Any] | Range]
+    keep_plans: bool = True
+    replay: bool = False
+    export: str | None = None  # a format of motions
+    values: Mapping[str, list[Any] | Range] = field(default_factory=dict)
+    count: int = 1  # random
+    seed: int = 0
+    listed: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def keys(self) -> list[str]:
+        """The keys in which the cases differ."""
+        return list(self.listed[0]) if self.listed else list(self.values)
 
     @property
     def source(self) -> dict[str, str]:
@@ -82,8 +92,9 @@ class Sweep:
         digests = [
             hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file is not None and Path(file).is_file()
         ]
-        base = json.dumps([known, digests], sort_keys=True, default=str)
-        drawn = self._grid() if self.kind == "grid" else self._random()
+        extras = [self.replay, self.export] if self.replay or self.export else []
+        base = json.dumps([known, digests, *extras], sort_keys=True, default=str)
+        drawn = self.listed or (self._grid() if self.kind == "grid" else self._random())
         found = []
         for number, values in enumerate(drawn):
             content = f"{base}\n{json.dumps(values, sort_keys=True, default=str)}"
@@ -177,11 +188,20 @@ def of(scenario: Callable[[], Scenario], table: Mapping[str, Any], where: str = 
             raise InputError(f"{where}{key}: {value!r}: expected a {'whole ' if whole else ''}number from {low:g} to {high:g}")
         return float(value)
 
-    kind, keep = table.get("kind", "grid"), table.get("keep_plans", True)
+    kind, export = table.get("kind", "grid"), table.get("export")
+    keep, replay = table.get("keep_plans", True), table.get("replay", False)
     if kind not in KINDS:
         raise InputError(f"{where}kind: {kind!r}: expected {' or '.join(KINDS)}")
-    if not isinstance(keep, bool):
-        raise InputError(f"{where}keep_plans: {keep!r}: expected true or false")
+    for key, value in (("keep_plans", keep), ("replay", replay)):
+        if not isinstance(value, bool):
+            raise InputError(f"{where}{key}: {value!r}: expected true or false")
+    if export is not None:
+        from ..commands.export import formats
+
+        if export not in formats():
+            raise InputError(f"{where}export: {export!r}: there is no such format; the formats are {', '.join(formats())}")
+    if (replay or export is not None) and not keep:
+        raise InputError(f"{where}keep_plans: false: a plan that is replayed or exported is kept")
     if kind == "random" and "count" not in table:
         raise InputError(f"{where}count: is missing; how many cases to draw")
     values = table.get("values")
@@ -196,5 +216,7 @@ def of(scenario: Callable[[], Scenario], table: Mapping[str, Any], where: str = 
         time_limit=limited("time_limit", 300.0, 1.0, 1e6),
         memory_limit=limited("memory_limit", 2.0, 0.1, 1024.0),
         keep_plans=keep,
+        replay=replay,
+        export=export,
         values={key: _choices(f"{where}values.{key}", value, kind == "grid") for key, value in _flat(values)},
     )

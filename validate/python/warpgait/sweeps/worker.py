@@ -22,7 +22,10 @@ from typing import IO, Any
 
 from .. import _native  # noqa: F401 (loaded before the forks)
 from ..errors import InputError
+from ..files import stem_of
+from ..plans import Plan
 from ..scenario import Scenario
+from ..settings import without_opengl
 
 SOLVED, FAILED, REFUSED, TIMED_OUT, KILLED = "solved", "failed", "refused", "timed out", "killed"
 _SPARE_SECONDS = 10.0  # of processor time beyond the limit, which is enforced by the clock
@@ -44,7 +47,7 @@ def _worst(checks: list[dict[str, Any]]) -> tuple[str | None, float | None]:
     return (max(uses)[1], max(uses)[0]) if uses else (None, None)
 
 
-def _path(plan: Any) -> list[list[float]]:
+def _path(plan: Plan) -> list[list[float]]:
     """The base's way from above, m."""
     times = [plan.duration * k / (_PATH_POINTS - 1) for k in range(_PATH_POINTS)]
     return [[round(float(x), 3), round(float(y), 3)] for x, y, _ in plan.base(times).position]
@@ -59,12 +62,13 @@ def solve(order: dict[str, Any]) -> dict[str, Any]:
         if order["plan"] is not None:
             Path(order["plan"]).parent.mkdir(parents=True, exist_ok=True)
             plan.save(order["plan"])
+        good = plan.solved and plan.passed
+        beyond = _beyond(order, plan) if good else {}
     except InputError as error:
         return {"status": REFUSED, "reason": str(error), "seconds": time.perf_counter() - start}
     solver, checks = plan.meta["solver"], plan.meta["checks"]
     broken = [row["name"] for row in checks if not row["passed"]]
     worst, used = _worst(checks)
-    good = plan.solved and not broken
     reason = "" if good else f"{solver['status']}; fails {', '.join(broken) or 'no check'}"
     return {
         "status": SOLVED if good else FAILED,
@@ -82,7 +86,39 @@ def solve(order: dict[str, Any]) -> dict[str, Any]:
         "warpgait_version": plan.meta["warpgait_version"],
         "warpgait_commit": plan.meta["warpgait_commit"],
         "laws": checks,
+        **beyond,
     }
+
+
+def _beyond(order: dict[str, Any], plan: Plan) -> dict[str, Any]:
+    """Replay a good plan, and export it if it is tracked, as the order says."""
+    found: dict[str, Any] = {}
+    if order.get("replay"):
+        from ..report import write_json
+        from ..settings import Settings
+
+        report = plan.validate(Settings(quick=True))
+        write_json(report.validation, plan.path.with_name(f"{stem_of(plan.path)}.report.json"))
+        found = {"verdict": report.verdict, "first_failure": report.first_failure}
+        if not report.trackable:
+            return found
+    if order.get("export"):
+        from ..commands.export import chosen, export
+
+        target = chosen(order["export"])
+        folder = plan.path.parent.parent / "motions"
+        folder.mkdir(exist_ok=True)
+        written, motion = export(plan.path, target, folder / f"{stem_of(plan.path)}{target.ending}")
+        found |= {"motion": f"motions/{written[0].relative_to(folder).parts[0]}", "frames": len(motion.t), "rate": motion.rate}
+        found["margins"] = motion.certificate["margins"]
+    return found
+
+
+def _prepare(order: dict[str, Any]) -> None:
+    """Import what the order needs before the fork, once for all cases."""
+    if order.get("replay") or order.get("export"):
+        with without_opengl():
+            from .. import motions, report, validation  # noqa: F401
 
 
 def _child(order: dict[str, Any], output: int, errors: IO[bytes], parent: int) -> None:
@@ -125,6 +161,7 @@ def _killed(order: dict[str, Any], status: int, errors: IO[bytes]) -> dict[str, 
 
 def run(order: dict[str, Any]) -> dict[str, Any] | None:
     """The result of an order; none when whoever gave it is gone."""
+    _prepare(order)
     started = time.monotonic()
     reading, writing = os.pipe()
     with tempfile.TemporaryFile() as errors:
