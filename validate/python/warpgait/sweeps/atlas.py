@@ -204,9 +204,20 @@ def _wedge(x: float, y: float, yaw: float, half: float, radius: float) -> str:
     return f"M{x:.1f} {y:.1f}L{ax:.1f} {ay:.1f}A{radius:.1f} {radius:.1f} 0 {int(half > math.pi / 2)} 0 {bx:.1f} {by:.1f}z"
 
 
+def _status(row: dict[str, Any]) -> str | None:
+    return str(row["status"])
+
+
+def _law(row: dict[str, Any]) -> str | None:
+    """The law that a solved motion comes nearest to, or the first that a failed one breaks."""
+    if row["status"] == FAILED and row["broken_laws"]:
+        return f"{str(row['broken_laws']).split()[0]}, broken"
+    return row["binding_law"] if row["status"] == SOLVED else None
+
+
 def _binding_colors(rows: list[dict[str, Any]]) -> dict[str, str]:
     """Colors of the laws that bind, the most frequent first."""
-    counted = Counter(row["binding_law"] for row in rows if row["status"] == SOLVED and row["binding_law"])
+    counted = Counter(law for row in rows if (law := _law(row)))
     return dict(zip((law for law, _ in counted.most_common()), _LAWS, strict=False))
 
 
@@ -220,11 +231,10 @@ def maps(found: Atlas) -> list[str]:
     for gait in dict.fromkeys(row["gait"] for row in found.rows):
         rows = [row for row in found.rows if row["gait"] == gait]
         half = math.pi / max(len({row["heading"] for row in rows}), 1)
-        for title, colors, key in (("verdict", _VERDICTS, "status"), ("law that binds", laws, "binding_law")):
+        for title, colors, of in (("verdict", _VERDICTS, _status), ("law that binds", laws, _law)):
             shapes: dict[str, list[str]] = {}
             for row in rows:
-                color = colors.get(row[key]) if key == "status" or row["status"] == SOLVED else None
-                if color:
+                if (name := of(row)) and (color := colors.get(name)):
                     at = _MARGIN + scale * (row["x"] - x_min), _MARGIN + scale * (y_max - row["y"])
                     shapes.setdefault(color, []).append(_wedge(*at, row["heading"], 0.9 * half, 0.45 * scale * found.step))
             paths = "".join(f'<path d="{"".join(d)}" fill="{color}" fill-opacity="0.85"/>' for color, d in shapes.items())

@@ -90,10 +90,20 @@ const SHAPES = {
   disc: () => lid(0, 1),
 };
 
+// Whether the browser draws without a graphics card; smooth edges then cost more than they are worth.
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2"), named = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : "";
+  if (gl) gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
 class Drawing {
+  static quality = 1; // pixels drawn for one shown, along each axis; less while frames take long
+
   constructor(canvas) {
     this.canvas = canvas;
-    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
+    const gl = canvas.getContext("webgl2", { antialias: !(Drawing.software ??= drawsInSoftware()), alpha: false });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.gl = gl;
     this.program = this.compiled();
@@ -139,7 +149,7 @@ class Drawing {
 
   // Clear, and look from `eye` at `target`.
   begin(eye, target, paper) {
-    const gl = this.gl, canvas = this.canvas, dense = Math.min(window.devicePixelRatio || 1, 2);
+    const gl = this.gl, canvas = this.canvas, dense = Math.min(window.devicePixelRatio || 1, 2) * Drawing.quality;
     const width = Math.max(1, Math.round(canvas.clientWidth * dense)), height = Math.max(1, Math.round(canvas.clientHeight * dense));
     if (canvas.width !== width || canvas.height !== height) {
       canvas.width = width;

@@ -1,5 +1,7 @@
 // The page: time, camera, switches, and what is under the pointer.
 
+const SLOW = 40, COARSEST = 0.4; // ms a frame, and the least quality
+
 const by = (id) => document.getElementById(id);
 
 function element(kind, text, parent, name) {
@@ -79,9 +81,21 @@ function start() {
     ink = colors();
     state.stale = true;
   });
-  let before = performance.now();
+  let before = performance.now(), slow = 0;
+  // Coarser pictures while they move too slowly, fine ones when they stand.
+  function adapt(milliseconds) {
+    slow = state.playing ? 0.8 * slow + 0.2 * Math.min(milliseconds, 500) : 0;
+    if (slow > SLOW && Drawing.quality > COARSEST) {
+      Drawing.quality *= 0.8;
+      slow = 0;
+    } else if (!state.playing && Drawing.quality < 1) {
+      Drawing.quality = 1;
+      state.stale = true;
+    }
+  }
   function frame(now) {
     const passed = Math.min((now - before) / 1000, 0.1);
+    adapt(now - before);
     before = now;
     if (state.playing) {
       state.time += passed * state.speed;
