@@ -240,11 +240,11 @@ def maps(found: Atlas) -> list[str]:
             paths = "".join(f'<path d="{"".join(d)}" fill="{color}" fill-opacity="0.85"/>' for color, d in shapes.items())
             used = [(name, color) for name, color in colors.items() if color in shapes]
             legend = "".join(
-                f'<rect x="{_MARGIN + 150 * (k % 4)}" y="{height + 38 + 18 * (k // 4):.0f}" width="11" height="11" fill="{color}"/>'
-                f'<text x="{_MARGIN + 16 + 150 * (k % 4)}" y="{height + 48 + 18 * (k // 4):.0f}">{escape(name)}</text>'
+                f'<rect x="{_MARGIN + 210 * (k % 3)}" y="{height + 38 + 18 * (k // 3):.0f}" width="11" height="11" fill="{color}"/>'
+                f'<text x="{_MARGIN + 16 + 210 * (k % 3)}" y="{height + 48 + 18 * (k // 3):.0f}">{escape(name)}</text>'
                 for k, (name, color) in enumerate(used)
             )
-            full = max(width, 600) + 2 * _MARGIN, height + 62 + 18 * ((len(used) + 3) // 4)
+            full = max(width, 630) + 2 * _MARGIN, height + 62 + 18 * ((len(used) + 2) // 3)
             drawn.append(
                 f'<svg xmlns="http://www.w3.org/2000/svg" width="{full[0]:.0f}" height="{full[1]:.0f}" viewBox="0 0 {full[0]:.0f} {full[1]:.0f}" '
                 f'font-family="system-ui,sans-serif" font-size="12" fill="#444">'
