@@ -16,6 +16,7 @@ import pytest
 import warpgait
 from warpgait import InputError, Scenario, Terrain
 from warpgait.commands.atlas import main
+from warpgait.sweeps import pool
 from warpgait.sweeps.atlas import listed, places
 
 
@@ -107,3 +108,34 @@ def test_a_ground_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.Captu
     assert "none.png" in capsys.readouterr().err
     with pytest.raises(InputError):
         warpgait.atlas(Terrain.file(tmp_path / "none.png"), folder=tmp_path / "a")
+
+
+def test_the_map_is_built_once_before_the_other_cases_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("WARPGAIT_CACHE", str(cache))
+    seen: list[int] = []
+
+    def progress(finished: int, _count: int, _case: Any, _result: dict[str, Any]) -> None:
+        seen.append(len(list(cache.glob("*"))))
+
+    hill = Terrain.formula("0.1*sin(2*x)*cos(y)", extent=(-1.2, 1.2, -1.2, 1.2), spacing=0.05)
+    base = Scenario(
+        terrain=hill,
+        formulation="warped",
+        robot="anymal_towr",
+        horizon=2.0,
+        start=(0, 0),
+        goal=(0, 0),
+        map={"cells": [10, 10, 6]},
+    )
+    base = base.set("solver.effort", "feasible")
+    started: list[tuple[int, int]] = []
+    run = pool.run
+
+    def recorded(sweep: Any, folder: Path, cases: list[Any], workers: int, tell: Any) -> None:
+        started.append((len(cases), workers))
+        run(sweep, folder, cases, workers, tell)
+
+    monkeypatch.setattr(pool, "run", recorded)
+    found = warpgait.atlas(base, folder=tmp_path / "a", step=2.4, headings=3, distance=0.2, workers=2, progress=progress)
+    assert started == [(1, 1), (2, 2)] and seen == [1, 1, 1] and found.fraction() == 1.0
