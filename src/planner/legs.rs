@@ -297,29 +297,25 @@ impl<'a> BodyMotion<'a> {
     /// samples. What is left turns the trunk to and fro by less than a milliradian, as it would turn a real one. In each time step,
     ///
     /// ```text
-    ///   J (θ_n+1 − 2 θ_n + θ_n−1) / δ² = −ρ_n,   θ = 0 at the samples,
+    ///   (J_n+½ (θ_n+1 − θ_n) − J_n−½ (θ_n − θ_n−1)) / δ² = −ρ_n,   θ = 0 at the samples,
     /// ```
     ///
     /// is solved for small turns θ, with ρ the residual less the function of time that is linear between samples and has the same averages,
     /// and J the angular momentum of a turn of the base alone. None where the base's knots are not those of the samples.
     pub fn settled(mut self, x: &[f64]) -> Option<(Layout, Vec<f64>)> {
         let layout = &self.model.layout;
-        let responses: Vec<Matrix3<f64>> =
-            (0..layout.intervals).map(|k| self.response(k)).collect::<Option<_>>()?;
+        let inertias: Vec<Matrix3<f64>> = (0..self.postures.len()).map(|n| self.turning_inertia(n)).collect();
         let torques = self.torques_of_forces(x);
         let given = self.rotations.clone();
         for _ in 0..SETTLING_ROUNDS {
             let residuals = self.oscillation(&torques);
             for k in 0..layout.intervals {
-                let mut turns: Vec<[f64; 3]> = (1..self.fine)
-                    .map(|n| (responses[k] * residuals[k * self.fine + n] * self.step.powi(2)).into())
-                    .collect();
-                solve_tridiagonal(2.0, -1.0, &mut turns);
-                for (n, turn) in (1..self.fine).zip(turns) {
-                    let at = k * self.fine + n;
-                    self.rotations[at] = Rotation3::new(turn.into()).matrix() * self.rotations[at];
-                    let guess = self.postures[at].shift;
-                    self.postures[at] = self.posture(at, &self.rotations[at], guess);
+                let first = k * self.fine;
+                let turns = small_turns(&inertias[first..=first + self.fine], &residuals[first + 1..first + self.fine])?;
+                for (n, turn) in (first + 1..).zip(turns) {
+                    self.rotations[n] = Rotation3::new(turn * self.step.powi(2)).matrix() * self.rotations[n];
+                    let guess = self.postures[n].shift;
+                    self.postures[n] = self.posture(n, &self.rotations[n], guess);
                 }
             }
         }
@@ -338,9 +334,9 @@ impl<'a> BodyMotion<'a> {
         layout.with_fine_base(x, self.fine, &values)
     }
 
-    /// From a torque to the angular acceleration of the base, while the feet stay where they are, in the middle of an interval; world frame.
-    fn response(&self, k: usize) -> Option<Matrix3<f64>> {
-        let n = k * self.fine + self.fine / 2;
+    /// J at the n-th end of a step: from the angular velocity of the base to the angular momentum, while the feet stay where they are; world
+    /// frame, kg m².
+    fn turning_inertia(&self, n: usize) -> Matrix3<f64> {
         let (posture, r) = (&self.postures[n], &self.rotations[n]);
         let columns: [Vector3<f64>; 3] = std::array::from_fn(|c| {
             let mut turn = Vector3::zeros();
@@ -349,7 +345,7 @@ impl<'a> BodyMotion<'a> {
             let moved = self.posture(n, &turned, posture.shift);
             self.body.angular_momentum([(posture, r), (&moved, &turned)], NUDGE)
         });
-        Matrix3::from_columns(&columns).try_inverse()
+        Matrix3::from_columns(&columns)
     }
 
     /// ρ: the residual of Euler's law without its averages over the rows' hats; world frame, N m.
@@ -377,8 +373,32 @@ impl<'a> BodyMotion<'a> {
     }
 }
 
-/// J changes little within a time step.
+/// J hardly changes with the turns.
 const SETTLING_ROUNDS: usize = 2;
+
+/// θ_n / δ² of [`BodyMotion::settled`] at the inner ends of the steps of an interval, from J at all ends and ρ at the inner ones: Gauss's
+/// elimination by blocks. None if J is singular.
+fn small_turns(inertias: &[Matrix3<f64>], residuals: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+    let between: Vec<Matrix3<f64>> = inertias.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5).collect();
+    let mut eliminated: Vec<(Matrix3<f64>, Vector3<f64>)> = Vec::with_capacity(residuals.len());
+    for (n, residual) in residuals.iter().enumerate() {
+        let (left, right) = (between[n], between[n + 1]);
+        let (mut diagonal, mut value) = (left + right, *residual);
+        if let Some((above, known)) = eliminated.last() {
+            diagonal -= left * above;
+            value += left * known;
+        }
+        let inverse = diagonal.try_inverse()?;
+        eliminated.push((inverse * right, inverse * value));
+    }
+    let mut turns = vec![Vector3::zeros(); residuals.len()];
+    let mut next = Vector3::zeros();
+    for (turn, (above, known)) in turns.iter_mut().zip(eliminated).rev() {
+        next = known + above * next;
+        *turn = next;
+    }
+    Some(turns)
+}
 
 /// The contact points of a foot, m.
 fn contacts(model: &Model, layout: &Layout, i: usize, x: &[f64], fine: usize) -> Vec<Vector3<f64>> {
