@@ -165,7 +165,8 @@ def _frozen(words: list[str]) -> dict[str, float]:
 
 def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
     m, key = reader.model, _key(reader)
-    postures = [_posture(reader, key, central) for central in (0.0, 0.5, 1.0)]
+    # A keyframe may be no stance, so the feet are looked for without it, too.
+    postures = [_posture(reader, angles, central) for angles in (key, {}) for central in (0.0, 0.5, 1.0)]
     names = [reader.joint_name(j) for j in range(m.njnt)]
     for name, angle in _frozen(options.freeze).items():
         if name not in names:
@@ -216,6 +217,9 @@ def _limited(reader: Reader, link: Link, k: int, options: argparse.Namespace) ->
         )
     if limits.range is None:
         limits.range = (options.range[0], options.range[1])
+    low, high = limits.range
+    if high - low > 2 * np.pi:
+        limits.range = (-np.pi, np.pi)
     return replace(link, limits=limits)
 
 
@@ -282,6 +286,9 @@ def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
         source, q = "--stance", stances.given(skeleton, options.stance)
     else:
         found = stances.of_key(skeleton)
+        if found is not None and not stances.stands(skeleton.legs, found):
+            skeleton.notes.append("the keyframe is no stance: its feet are not all well below the hips; one is computed instead")
+            found = None
         source, q = ("keyframe", found) if found is not None else ("computed", stances.computed(skeleton.legs))
     stances.judge(skeleton, q, source)
     feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
@@ -289,10 +296,7 @@ def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
     skeleton.legs = [_trim(skeleton, skeleton.legs[e], q[e]) for e in sequence]
     skeleton.base = _trunk(skeleton.base, skeleton.legs, skeleton.notes)
     q, feet = [q[e] for e in sequence], [feet[e] for e in sequence]
-    lengths = [
-        np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor)
-        for leg in skeleton.legs
-    ]
+    lengths = [stances.length(leg) for leg in skeleton.legs]
     cycle = round(20 * CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH))) / 20
     words = options.source or f"from {path.name}"
     names = foot_names(feet)

@@ -13,6 +13,7 @@ from .reach import Box
 from .skeleton import Leg, Skeleton
 
 STRETCH = 0.72  # height of the hip above the foot in a computed stance, in lengths of the leg from there: about ANYmal's
+LEAST_HEIGHT = 0.35  # of the hip above the foot in a keyframe that is taken for a stance, in the same lengths
 AT_LIMIT = 0.02  # rad inside its range that a computed stance keeps each joint
 CENTRAL = 0.4  # of half a reach box: how far a foot stands from its middle, along x and y
 REACHED = 1e-5  # m
@@ -44,13 +45,23 @@ def ranges(leg: Leg) -> Array:
     return np.array([row if row is not None else (-np.pi, np.pi) for row in rows])
 
 
+def length(leg: Leg) -> float:
+    """Of a stretched leg, from its second joint to the center of its foot, m."""
+    return float(np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor))
+
+
+def stands(legs: list[Leg], stance: list[Array]) -> bool:
+    """Whether all feet are well below the second joints of their legs."""
+    return all(
+        frames[1][1][2] - foot[2] >= LEAST_HEIGHT * length(leg)
+        for leg, q in zip(legs, stance, strict=True)
+        for foot, frames in [place(leg, q)]
+    )
+
+
 def computed(legs: list[Leg]) -> list[Array]:
     """Stances with each foot under its hip, all at one height: the joint angles nearest to the middle of their ranges that do it."""
-    lengths = [
-        float(np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor))
-        for leg in legs
-    ]
-    height = min(leg.links[1].anchor[2] - STRETCH * length - leg.radius for leg, length in zip(legs, lengths, strict=True))
+    height = min(leg.links[1].anchor[2] - STRETCH * length(leg) - leg.radius for leg in legs)
     return [_under_hip(leg, np.array([leg.links[1].anchor[0], leg.foot[1], height + leg.radius])) for leg in legs]
 
 
