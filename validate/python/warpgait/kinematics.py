@@ -1,4 +1,8 @@
-"""Closed-form inverse kinematics of a leg with hip abduction (about x), hip flexion and knee flexion (both about y), in either sense."""
+"""Inverse kinematics of the legs of a model.
+
+There is a closed form for legs with hip abduction (about x), hip flexion and knee flexion (both about y), in either sense; `serial.py` has the
+others.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,8 @@ import mujoco
 import numpy as np
 
 from .arrays import Array, Bools
-from .errors import InputError
 from .model import leg_joints
+from .serial import SerialLeg, plane_across
 
 _LEAST_DROP = 1e-8  # m², the least squared distance of a reached foot from the HAA axis, in the leg's plane
 _TOLERANCE = 1e-6  # of the direction of a joint axis
@@ -22,8 +26,8 @@ def _wrap(angle: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Leg:
-    """One leg, read from the model at zero joint angles. Lengths in m, base frame."""
+class PlanarLeg:
+    """One leg with a closed form, read from the model at zero joint angles. Lengths in m, base frame."""
 
     name: str
     hip: Array  # (3,) a point on the HAA axis
@@ -61,9 +65,8 @@ class Leg:
         middle = (self.lower + self.upper) / 2
         return middle + _wrap(q - middle), reachable
 
-    def knee_angle(self, foot: Array) -> Array:
-        """Angle between thigh and shank, rad: 0 stretched, π folded."""
-        q, _ = self.inverse(foot)
+    def knee_angle(self, q: Array) -> Array:
+        """Angle between thigh and shank, rad: 0 stretched, π folded; for joint angles (..., 3)."""
         return np.abs(_wrap(self.signs[2] * q[..., 2] - (self.shank_zero - self.thigh_zero)))
 
     def thigh_angle(self, q: Array) -> Array:
@@ -75,14 +78,37 @@ class Leg:
         """Of thigh and shank, m."""
         return self.thigh + self.shank
 
+    @property
+    def span(self) -> float:
+        """No point that the foot's center reaches is further from `hip`."""
+        return self.length + abs(self.lateral) + abs(self.flexion_offset) + abs(self.rise)
+
+    @property
+    def plane(self) -> Array:
+        """Two unit vectors (2, 3) across the KFE axis: x and z."""
+        return plane_across(np.array([0.0, 1.0, 0.0]))
+
+    @property
+    def along(self) -> Array:
+        """From the KFE axis to the foot, in `plane`, at zero joint angles: a unit vector (2,)."""
+        return np.array([np.sin(self.shank_zero), -np.cos(self.shank_zero)])
+
+    @property
+    def outward(self) -> Array:
+        """Across that line, out of the bend (2,)."""
+        return self.bend * np.array([-self.along[1], self.along[0]])
+
     def within_limits(self, q: Array) -> Bools:
         """Whether joint angles (..., 3) are within the limits."""
         ok: Bools = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
         return ok
 
 
+Leg = PlanarLeg | SerialLeg
+
+
 def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
-    """The legs that end in `feet`; refuses a model with another kind of leg. Knees bend as in the keyframe `stand`."""
+    """The legs that end in `feet`, of three hinges each. Knees bend as in the keyframe `stand`."""
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
     mujoco.mj_forward(model, data)
@@ -94,13 +120,15 @@ def _leg(model: Any, data: Any, name: str) -> Leg:
     haa, hfe, kfe = (data.xanchor[i].copy() for i in ids)
     axes = data.xaxis[ids]
     signs = np.sign(axes[[0, 1, 2], [0, 1, 1]])
-    if not np.allclose(axes, signs[:, None] * [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=_TOLERANCE):
-        raise InputError(f"leg {name}: the inverse kinematics of the replay needs joint axes x, y, y at zero joint angles")
     foot = data.site(name).xpos.copy()
+    if not np.allclose(axes, signs[:, None] * [[1, 0, 0], [0, 1, 0], [0, 1, 0]], atol=_TOLERANCE):
+        stance = model.key("stand").qpos[model.jnt_qposadr[ids]].copy()
+        limits = model.jnt_range[ids]
+        return SerialLeg(name, np.array([haa, hfe, kfe]), axes.copy(), foot, stance, limits[:, 0].copy(), limits[:, 1].copy())
     upper, lower = kfe - hfe, foot - kfe
     thigh_zero, shank_zero = (float(np.arctan2(v[0], -v[2])) for v in (upper, lower))
     stance = model.key("stand").qpos[model.jnt_qposadr[ids[2]]]
-    return Leg(
+    return PlanarLeg(
         name=name,
         hip=haa,
         flexion_offset=float(hfe[0] - haa[0]),

@@ -1,6 +1,6 @@
 """The reach box of a foot: the largest axis-aligned box inside the set that the leg reaches.
 
-The set is sampled on a grid by closed-form inverse kinematics. A contact point counts as reached if the leg reaches the foot's center, one
+The set is sampled on a grid by inverse kinematics. A contact point counts as reached if the leg reaches the foot's center, one
 radius along the terrain's normal, on level ground and on ground tilted in four directions.
 """
 
@@ -36,19 +36,22 @@ class Box:
 def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRules) -> Bools:
     """Whether contact points (..., 3), base frame, m, belong to the reach set of `leg`."""
     s, c = np.sin(rules.tilt), np.cos(rules.tilt)
-    ok = np.ones(contact.shape[:-1], bool)
-    for normal in ([0, 0, 1], [s, 0, c], [-s, 0, c], [0, s, c], [0, -s, c]):
-        center = contact + radius * np.asarray(normal, float)
-        q, possible = leg.inverse(center)
-        knee = leg.knee_angle(center)
-        ok &= possible & leg.within_limits(q) & (knee >= rules.knee[0]) & (knee <= rules.knee[1])
-        ok &= leg.thigh_angle(q) <= rules.flexion
-        gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
-        ok &= (gap > 0).any(-1)
+    points = contact.reshape(-1, 3)
+    ok = np.linalg.norm(points - leg.hip, axis=1) <= leg.span + radius
     for axis in range(2):  # a leg in the middle has no side
         if abs(leg.hip[axis]) > rules.side:
-            ok &= contact[..., axis] * np.sign(leg.hip[axis]) > rules.side
-    return ok
+            ok &= points[:, axis] * np.sign(leg.hip[axis]) > rules.side
+    for normal in ([0, 0, 1], [s, 0, c], [-s, 0, c], [0, s, c], [0, -s, c]):
+        left = np.flatnonzero(ok)
+        center = points[left] + radius * np.asarray(normal, float)
+        gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
+        clear = (gap > 0).any(-1)
+        ok[left[~clear]] = False
+        left, center = left[clear], center[clear]
+        q, possible = leg.inverse(center)
+        knee = leg.knee_angle(q)
+        ok[left] = possible & leg.within_limits(q) & (knee >= rules.knee[0]) & (knee <= rules.knee[1]) & (leg.thigh_angle(q) <= rules.flexion)
+    return ok.reshape(contact.shape[:-1])
 
 
 def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:
@@ -95,7 +98,7 @@ def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Arr
 
     The grid points at both ends of the box are reached, so its edges are the distances between them.
     """
-    reach = leg.thigh + leg.shank + abs(leg.lateral) + radius
+    reach = leg.span + radius
     axes = [np.arange(np.floor((h - reach) / resolution), (h + reach) / resolution) * resolution for h in leg.hip]
     axes[2] = axes[2][axes[2] < leg.hip[2]]
     mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)

@@ -35,6 +35,7 @@ from .model import (
     stand,
 )
 from .reach import Box, ReachRules, reach_box, reached
+from .serial import SerialLeg
 
 LEAST_BOX = np.array([0.30, 0.20, 0.20])
 """Least edges of a reach box, m, for a robot of ANYmal's size: those of TOWR's. Without them, the largest box is only 0.16 m high, too little for
@@ -42,6 +43,7 @@ rough ground."""
 LEAST_FRACTIONS = (1.0, 0.8, 0.6, 0.4)  # of these edges, in this order, until the leg reaches such a box
 LEAST_ROOM = 0.01  # m, for a robot of ANYmal's size: of the nominal foot inside its box
 RESOLUTION, SIDE = 0.01, 0.03  # m, for a robot of ANYmal's size: of the grid of the reach set; of a foot inside its quadrant
+SERIAL_CELLS = 36  # along the span of a leg whose inverse kinematics is numeric
 
 MIRROR_SAMPLES, MIRROR_FRACTION = 20_000, 0.999  # random points in a mirrored reach box, and the fraction that the leg must reach
 KNEE_DISTANCE = 0.01  # m: a shape of the thigh this close to the KFE axis is part of the knee
@@ -91,13 +93,12 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
     """Read from the collision shapes of the body that carries the foot of `leg`, and of the thigh above it."""
     body = model.geom_bodyid[model.geom(leg.name).id]
     radius, corner = 0.0, (0.0, 0.0)
-    foot = np.array([np.sin(leg.shank_zero), -np.cos(leg.shank_zero)])  # from the knee, x and z at zero joint angles
-    outward = leg.bend * np.array([-foot[1], foot[0]])
+    foot, outward = leg.along, leg.outward
     for g in np.flatnonzero(model.geom_bodyid == body):
         if g == model.geom(leg.name).id:
             continue
         box = geom_box(model, int(g))
-        center, half = box.center[[0, 2]], box.half_size[[0, 2]]
+        center, half = leg.plane @ box.center, np.abs(leg.plane) @ box.half_size
         corners = center + half * np.array(list(product([-1, 1], repeat=2)))
         if (np.abs(center) <= half).all():  # around the axis; its far end counts as a corner
             radius = max(radius, float(half[1]))
@@ -108,7 +109,7 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
     # The lower end of the thigh turns about the same axis.
     axis = model.body_pos[body]
     for g in np.flatnonzero(model.geom_bodyid == model.body_parentid[body]):
-        if np.hypot(*(model.geom_pos[g] - axis)[[0, 2]]) < KNEE_DISTANCE:
+        if np.hypot(*(leg.plane @ (model.geom_pos[g] - axis))) < KNEE_DISTANCE:
             radius = max(radius, float(model.geom_size[g][0]))
     return ShankShape(radius, corner, tube, tube_radius)
 
@@ -128,8 +129,8 @@ def _tube(model: Any, leg: Leg, foot: Array, outward: Array) -> tuple[tuple[floa
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, model.geom_quat[g])
         axis = rotation.reshape(3, 3)[:, 2]
-        ends = [(model.geom_pos[g] + side * half * axis)[[0, 2]] for side in (-1, 1)]
-        if abs(axis[1]) > 0.5:  # across the leg, as the knee's drive
+        ends = [leg.plane @ (model.geom_pos[g] + side * half * axis) for side in (-1, 1)]
+        if np.linalg.norm(leg.plane @ axis) < 0.87:  # across the leg, as the knee's drive
             continue
         upper = min(ends, key=lambda p: float(p @ foot))
         longest, end, radius = half, (float(upper @ foot), float(upper @ outward)), float(model.geom_size[g][0])
@@ -230,8 +231,11 @@ def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: f
 
 def _largest_box(name: str, leg: Leg, radius: float, trunk: Box, rules: ReachRules, size: float) -> Box:
     """The largest box with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
+    resolution = RESOLUTION * size
+    if isinstance(leg, SerialLeg):
+        resolution = max(resolution, leg.span / SERIAL_CELLS)
     for fraction in LEAST_FRACTIONS:
-        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, RESOLUTION * size)
+        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, resolution)
         if box is not None:
             return box
     least = LEAST_FRACTIONS[-1] * size * LEAST_BOX
