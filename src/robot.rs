@@ -19,10 +19,13 @@ const SHIPPED: &[(&str, &str)] = &[
     ("anymal_c", include_str!("../robots/anymal_c.toml")),
     ("a1", include_str!("../robots/a1.toml")),
     ("b1", include_str!("../robots/b1.toml")),
+    ("biped_towr", include_str!("../robots/biped_towr.toml")),
     ("go1", include_str!("../robots/go1.toml")),
     ("go2", include_str!("../robots/go2.toml")),
+    ("hexapod", include_str!("../robots/hexapod.toml")),
     ("hyq", include_str!("../robots/hyq.toml")),
     ("laikago", include_str!("../robots/laikago.toml")),
+    ("monoped_towr", include_str!("../robots/monoped_towr.toml")),
     ("solo12", include_str!("../robots/solo12.toml")),
 ];
 

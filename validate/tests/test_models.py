@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from warpgait import InputError
 from warpgait.arrays import Array
-from warpgait.kinematics import legs
+from warpgait.kinematics import PlanarLeg, legs
 from warpgait.model import available_models, find_model, foot_names, indices, load_spec, stand
 from warpgait.reach import largest_cuboid
 from warpgait.robots import derive, to_toml
@@ -160,8 +160,30 @@ def test_inverse_kinematics_returns_the_angles_it_was_given(name: str) -> None:
             assert q == pytest.approx(angles[e], abs=1e-9)
     for leg in legs(model, feet):
         assert not leg.inverse(leg.hip - np.array([0, 0, 2.0]))[1]
-        if abs(leg.lateral) > 0.01:  # HyQ's is zero
+        if isinstance(leg, PlanarLeg) and abs(leg.lateral) > 0.01:  # HyQ's is zero
             assert not leg.inverse(leg.hip + np.array([0, leg.lateral / 2, 0]))[1]  # inside the hip's offset
+
+
+def test_angles_of_knee_and_thigh_are_those_of_the_links() -> None:
+    for name in ("anymal_c", "hexapod"):
+        model = load_spec(find_model(name)).compile()
+        data = mujoco.MjData(model)
+        feet = foot_names(model)
+        index = indices(model, feet)
+        rng = np.random.default_rng(5)
+        for _ in range(20):
+            stand(model, data)
+            q = data.qpos[index.qpos] + rng.uniform(-0.4, 0.4, (len(feet), 3))
+            data.qpos[index.qpos] = q
+            mujoco.mj_kinematics(model, data)
+            for e, leg in enumerate(legs(model, feet)):
+                joints = [model.joint(joint).id for joint in index.joints_of[e]]
+                second, third = data.xanchor[joints[1]], data.xanchor[joints[2]]
+                axis = data.xaxis[joints[2]]
+                thigh, shank = third - second, data.site_xpos[index.site[e]] - third
+                across = [v - axis * (axis @ v) for v in (thigh, shank)]
+                cosine = across[0] @ across[1] / (np.linalg.norm(across[0]) * np.linalg.norm(across[1]))
+                assert leg.knee_angle(q[e]) == pytest.approx(np.arccos(cosine), abs=1e-6)
 
 
 def test_the_largest_cuboid_is_the_largest() -> None:

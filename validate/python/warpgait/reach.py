@@ -50,8 +50,15 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
         left, center = left[clear], center[clear]
         q, possible = leg.inverse(center)
         knee = leg.knee_angle(q)
-        ok[left] = possible & leg.within_limits(q) & (knee >= rules.knee[0]) & (knee <= rules.knee[1]) & (leg.thigh_angle(q) <= rules.flexion)
-    return ok.reshape(contact.shape[:-1])
+        ok[left] = (
+            possible
+            & leg.within_limits(q)
+            & (knee >= rules.knee[0])
+            & (knee <= rules.knee[1])
+            & (leg.thigh_angle(q) <= rules.flexion)
+        )
+    reached: Bools = ok.reshape(contact.shape[:-1])
+    return reached
 
 
 def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:

@@ -10,7 +10,7 @@ from .arrays import Array, Bools
 
 ROUNDING = 4e-3  # weight of the distance from the stance, in lengths of the leg: see the planner
 REACHED = 3e-3  # how far from its target a foot that is reached may be, in lengths of the leg
-_STEPS, _LARGEST_TURN, _CONVERGED = 60, 0.6, 1e-10  # of the minimization; rad; rad
+_STEPS, _LARGEST_TURN, _CONVERGED, _POLISHING = 60, 0.6, 1e-6, 4  # of the minimization; rad; rad; steps without the weight
 _UPRIGHT = 0.8  # z of the first axis from which on a leg turns about the vertical, as an insect's does
 
 
@@ -38,7 +38,8 @@ class SerialLeg:
     @property
     def hip(self) -> Array:
         """A point on the first axis (3,)."""
-        return self.anchors[0]
+        first: Array = self.anchors[0]
+        return first
 
     @property
     def length(self) -> float:
@@ -93,15 +94,24 @@ class SerialLeg:
         for _ in range(_STEPS):
             if not active.size:
                 break
-            at, points, axes = self.place(q[active])
-            J = np.cross(axes, at[:, None] - points)  # (M, joint, 3)
-            gradient = np.einsum("mji,mi->mj", J, targets[active] - at) - weight * (q[active] - self.stance)
-            step = np.linalg.solve(J @ J.transpose(0, 2, 1) + weight * np.eye(3), gradient[..., None])[..., 0]
-            most = np.abs(step).max(1)
-            q[active] += step * np.minimum(1.0, _LARGEST_TURN / np.maximum(most, 1e-12))[:, None]
-            active = active[most > _CONVERGED]
+            step = self._step(q[active], targets[active], weight, self.stance)
+            q[active] += step
+            active = active[np.abs(step).max(1) > _CONVERGED]
         reached: Bools = np.linalg.norm(self.place(q)[0] - targets, axis=1) < REACHED * self.length
+        for _ in range(_POLISHING):  # what the stance's weight has left
+            within = np.flatnonzero(reached)
+            q[within] += self._step(q[within], targets[within], 1e-6 * weight, q[within])
         return q.reshape(foot.shape), reached.reshape(foot.shape[:-1])
+
+    def _step(self, q: Array, targets: Array, weight: float, stance: Array) -> Array:
+        """A Gauss-Newton step (M, 3) toward the least distance from the targets (M, 3), and from `stance` times a weight."""
+        at, points, axes = self.place(q)
+        J = np.cross(axes, at[:, None] - points)  # (M, joint, 3)
+        gradient = np.einsum("mji,mi->mj", J, targets - at) - weight * (q - stance)
+        step = np.linalg.solve(J @ J.transpose(0, 2, 1) + weight * np.eye(3), gradient[..., None])[..., 0]
+        most = np.abs(step).max(1)
+        shortened: Array = step * np.minimum(1.0, _LARGEST_TURN / np.maximum(most, 1e-12))[:, None]
+        return shortened
 
     def knee_angle(self, q: Array) -> Array:
         """Angle between thigh and shank across the last axis, rad: 0 stretched, π folded; for joint angles (..., 3)."""
