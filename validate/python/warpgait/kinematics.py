@@ -73,6 +73,10 @@ class PlanarLeg:
         """Angle of the thigh from straight down in the leg's plane, rad, for joint angles (..., 3)."""
         return np.abs(_wrap(self.thigh_zero - self.signs[1] * q[..., 1]))
 
+    def is_regular(self, q: Array) -> Bools:
+        """Whether the leg can move its foot in all directions, for joint angles (M, 3); here the limits of the knee see to that."""
+        return np.ones(q.shape[:-1], bool)
+
     @property
     def length(self) -> float:
         """Of thigh and shank, m."""

@@ -56,6 +56,7 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
             & (knee >= rules.knee[0])
             & (knee <= rules.knee[1])
             & (leg.thigh_angle(q) <= rules.flexion)
+            & leg.is_regular(q)
         )
     reached: Bools = ok.reshape(contact.shape[:-1])
     return reached

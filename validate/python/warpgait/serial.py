@@ -10,6 +10,7 @@ from .arrays import Array, Bools
 
 ROUNDING = 4e-3  # weight of the distance from the stance, in lengths of the leg: see the planner
 REACHED = 3e-3  # how far from its target a foot that is reached may be, in lengths of the leg
+REGULAR = 0.15  # least singular value of ∂foot/∂q in a regular posture, in lengths of the leg
 _STEPS, _LARGEST_TURN, _CONVERGED, _POLISHING = 60, 0.6, 1e-6, 4  # of the minimization; rad; rad; steps without the weight
 _UPRIGHT = 0.8  # z of the first axis from which on a leg turns about the vertical, as an insect's does
 
@@ -130,6 +131,13 @@ class SerialLeg:
         thigh = points[:, 2] - points[:, 1]
         angle: Array = np.arccos(np.clip(-thigh[:, 2] / np.linalg.norm(thigh, axis=1), -1, 1))
         return angle.reshape(q.shape[:-1])
+
+    def is_regular(self, q: Array) -> Bools:
+        """Whether the leg can move its foot in all directions, for joint angles (M, 3): not near the first axis, not stretched."""
+        at, points, axes = self.place(q)
+        least = np.linalg.svd(np.cross(axes, at[:, None] - points), compute_uv=False)[:, -1]
+        regular: Bools = least >= REGULAR * self.length
+        return regular
 
     def within_limits(self, q: Array) -> Bools:
         """Whether joint angles (..., 3) are within the limits."""
