@@ -7,7 +7,7 @@ mod write;
 
 pub use read::PLAN_SCHEMA;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::digest::sha256_hex;
 use crate::heightfield::Grid;
@@ -246,7 +246,8 @@ pub struct MetaSolver {
     pub success: bool,
     /// Iterations.
     pub iterations: usize,
-    /// Largest violation, units of the NLP.
+    /// Largest violation, units of the NLP; NaN (in the file: null) where it was not finite.
+    #[serde(deserialize_with = "number_or_nan")]
     pub max_violation: f64,
     /// SHA-256 (hexadecimal) of the elements of `history_objective`, `history_constraint_violation` and `history_seconds`, and of
     /// `max_violation`, in this order; none in plans of older versions.
@@ -264,7 +265,8 @@ pub struct MetaSolver {
 pub struct CheckRow {
     /// Which law.
     pub name: String,
-    /// Its worst value.
+    /// Its worst value; NaN (in the file: null) where the law cannot be evaluated.
+    #[serde(deserialize_with = "number_or_nan")]
     pub value: f64,
     /// Its unit.
     pub unit: String,
@@ -278,4 +280,30 @@ pub struct CheckRow {
     /// The foot at which it was worst.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub foot: Option<String>,
+}
+
+/// A number; NaN for null, as which JSON has numbers that are not finite.
+fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CheckRow;
+
+    #[test]
+    fn a_law_that_could_not_be_evaluated_is_read_again() {
+        let row = CheckRow {
+            name: "reach".into(),
+            value: f64::NAN,
+            unit: "mm".into(),
+            limit: 1.0,
+            passed: false,
+            time: None,
+            foot: None,
+        };
+        let text = serde_json::to_string(&row).expect("JSON");
+        let read: CheckRow = serde_json::from_str(&text).expect("what was written");
+        assert!(read.value.is_nan() && !read.passed, "{text}");
+    }
 }

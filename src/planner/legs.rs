@@ -301,7 +301,7 @@ impl<'a> BodyMotion<'a> {
     /// ```
     ///
     /// is solved for small turns θ, with ρ the residual less the function of time that is linear between samples and has the same averages,
-    /// and J the angular momentum of a turn of the base alone. None where the base's knots are not those of the samples.
+    /// and J the angular momentum of a turn of the base alone. None where the base's knots are not those of the samples, and where the turns are not small.
     pub fn settled(mut self, x: &[f64]) -> Option<(Layout, Vec<f64>)> {
         let layout = &self.model.layout;
         let inertias: Vec<Matrix3<f64>> = (0..self.postures.len()).map(|n| self.turning_inertia(n)).collect();
@@ -311,7 +311,13 @@ impl<'a> BodyMotion<'a> {
             let residuals = self.oscillation(&torques);
             for k in 0..layout.intervals {
                 let first = k * self.fine;
-                let turns = small_turns(&inertias[first..=first + self.fine], &residuals[first + 1..first + self.fine])?;
+                let turns = small_turns(
+                    &inertias[first..=first + self.fine],
+                    &residuals[first + 1..first + self.fine],
+                )?;
+                if turns.iter().any(|turn| turn.norm() * self.step.powi(2) > LARGEST_TURN) {
+                    return None;
+                }
                 for (n, turn) in (first + 1..).zip(turns) {
                     self.rotations[n] = Rotation3::new(turn * self.step.powi(2)).matrix() * self.rotations[n];
                     let guess = self.postures[n].shift;
@@ -373,6 +379,8 @@ impl<'a> BodyMotion<'a> {
     }
 }
 
+/// Larger turns are no vibration: a leg is where no joint angles lead. rad.
+const LARGEST_TURN: f64 = 0.05;
 /// J hardly changes with the turns.
 const SETTLING_ROUNDS: usize = 2;
 
