@@ -145,6 +145,22 @@ def test_a_terrain_is_evaluated_before_and_after_planning(plan: Plan, tmp_path: 
         Terrain.formula("0.1*", extent=(-1, 1, -1, 1)).height(points)
 
 
+def test_the_keys_of_scenarios_are_those_of_the_schema() -> None:
+    found = warpgait.keys()
+    names = {key.name for key in found}
+    assert {"horizon", "robot.name", "gait.duty", "terrain.expression", "start.position", "solver.effort"} <= names
+    (kind,) = warpgait.keys("gait.kind")
+    assert kind.default == "walk" and "trot" in kind.value and not kind.required
+    (place,) = warpgait.keys("start.position")
+    assert place.required and place.value.startswith("2 values: number")
+    expression = warpgait.keys("terrain.expression")
+    assert [key.variant for key in expression] == ["formula"]
+    assert {key.name for key in warpgait.keys("map")} <= names and all(key.meaning or key.name == "terrain.kind" for key in found)
+    assert "gait.kind" in repr(warpgait.keys("gait")) and warpgait.keys("gait")._repr_html_().count("<tr>") > 3
+    with pytest.raises(InputError, match=r"gait\.speed: there is no such key"):
+        warpgait.keys("gait.speed")
+
+
 def test_toml_is_read_as_it_was_written() -> None:
     values: dict[str, Any] = {
         "a": True,

@@ -240,3 +240,15 @@ def test_every_case_has_a_process_of_its_own_and_those_share_the_start(folder: P
     assert [result["status"] for result in results] == ["failed"] * 6
     assert all(result["laws"] and len(result["path"]) == 24 and result["warpgait_commit"] for result in results)
     assert all(float(row["memory_mb"]) < 300 for row in rows(folder))
+
+
+def test_a_plan_that_cannot_be_written_is_planned_again_on_request(folder: Path) -> None:
+    (folder / "s.toml").write_text('scenario = "walk.toml"\n[values]\nhorizon = [2.0]\n')
+    (case,) = spec.read(folder / "s.toml").cases()
+    in_the_way = folder / "s.sweep" / "plans" / f"{case.name}.plan.npz"
+    in_the_way.mkdir(parents=True)
+    assert sweep(folder, "-q") == 0
+    assert rows(folder)[0]["status"] == "killed" and "the plan cannot be written: " in rows(folder)[0]["reason"]
+    in_the_way.rmdir()
+    assert sweep(folder, "-q") == 0 and rows(folder)[0]["status"] == "killed"  # as before
+    assert sweep(folder, "-q", "--again") == 0 and rows(folder)[0]["status"] == "solved"

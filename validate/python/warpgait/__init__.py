@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .plans import Check, Plan, Report, check, load, solve, sweep, validate
     from .plans import Plan as Trajectory
     from .scenario import Robot, Scenario
+    from .schema import keys
     from .surface import Terrain
     from .sweeps.atlas import Atlas, atlas
     from .sweeps.dataset import Dataset, dataset
@@ -38,6 +39,7 @@ _PLACES = {
     "atlas": "sweeps.atlas",
     "check": "plans",
     "dataset": "sweeps.dataset",
+    "keys": "schema",
     "load": "plans",
     "solve": "plans",
     "sweep": "plans",
@@ -63,6 +65,7 @@ __all__ = [
     "atlas",
     "check",
     "dataset",
+    "keys",
     "load",
     "solve",
     "sweep",

@@ -59,9 +59,15 @@ def solve(order: dict[str, Any]) -> dict[str, Any]:
     try:
         scenario = Scenario.read(order["scenario"]) if "scenario" in order else Scenario.from_text(order["text"])
         plan = scenario.set(order["values"]).solve()
-        if order["plan"] is not None:
+    except InputError as error:
+        return {"status": REFUSED, "reason": str(error), "seconds": time.perf_counter() - start}
+    if order["plan"] is not None:
+        try:
             Path(order["plan"]).parent.mkdir(parents=True, exist_ok=True)
             plan.save(order["plan"])
+        except (InputError, OSError) as error:  # such as of a full disk: no fault of the case, which can be planned again
+            return {"status": KILLED, "reason": f"the plan cannot be written: {error}", "seconds": time.perf_counter() - start}
+    try:
         good = plan.solved and plan.passed
         beyond = _beyond(order, plan) if good else {}
     except InputError as error:
