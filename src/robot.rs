@@ -112,6 +112,9 @@ pub struct Robot {
     /// The feet, in the order of the plan's `foot_names`.
     #[schemars(length(min = 1, max = 16))]
     pub feet: Vec<Foot>,
+    /// Height of the center of mass above the feet at rest without a payload, m, where there is one.
+    #[serde(skip)]
+    pub bare_height: Option<f64>,
     /// Name as given in the scenario and SHA-256 (hexadecimal) of the file it was read from; none for a shipped robot.
     #[serde(skip)]
     pub input: Option<(String, String)>,
@@ -155,6 +158,41 @@ impl Robot {
         self.feet.iter().map(|foot| foot.name.as_str()).collect()
     }
 
+    /// The robot with a point mass, kg, fixed to its trunk, base frame, m. The base frame moves to the new center of mass.
+    ///
+    /// ```text
+    ///   c = m_p r / (m + m_p),   I' = I + m S(c) + m_p S(r − c),   S(v) = |v|² 1 − v vᵀ;   all places less c
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Key`] where the legs cannot be those of such a robot.
+    pub fn with_payload(mut self, payload: f64, position: [f64; 3]) -> Result<Self> {
+        let (mass, place) = (self.mass, Vector3::from(position));
+        let center = place * (payload / (mass + payload));
+        let spread = |v: &Vector3<f64>| Matrix3::identity() * v.norm_squared() - v * v.transpose();
+        let inertia = Matrix3::from_fn(|i, j| self.inertia[i][j])
+            + spread(&center) * mass
+            + spread(&(place - center)) * payload;
+        self.bare_height = Some(self.standing_height());
+        self.mass += payload;
+        self.inertia = std::array::from_fn(|i| std::array::from_fn(|j| inertia[(i, j)]));
+        let shift = |point: &mut [f64; 3]| (0..3).for_each(|c| point[c] -= center[c]);
+        shift(&mut self.torso.center);
+        for foot in &mut self.feet {
+            shift(&mut foot.nominal);
+            shift(&mut foot.reach.center);
+            if let Some(leg) = &mut foot.leg {
+                leg.hip.iter_mut().for_each(shift);
+                leg.joints.first_mut().into_iter().for_each(|joint| shift(&mut joint.position));
+                leg.build(foot.nominal).map_err(|e| Error::key("payload", e.what))?;
+            }
+        }
+        match self.build_body() {
+            Some(Err(what)) => Err(Error::key("payload", what)),
+            _ => Ok(self),
+        }
+    }
+
     /// Trunk and links, where the file has the joints of every leg. (A robot that cannot have such links is not loaded.)
     pub fn body(&self) -> Option<Body> {
         self.build_body()?.ok()
@@ -173,7 +211,10 @@ impl Robot {
 
     /// The robot's size in ANYmals, by its standing height: 1 for all ANYmals. Clearances and margins are proportional to it.
     pub fn size(&self) -> f64 {
-        (self.standing_height() / ANYMAL_HEIGHT / SIZE_STEP).round().max(1.0) * SIZE_STEP
+        (self.bare_height.unwrap_or_else(|| self.standing_height()) / ANYMAL_HEIGHT / SIZE_STEP)
+            .round()
+            .max(1.0)
+            * SIZE_STEP
     }
 
     /// Radius of the largest foot, m; a typical one for the robot's height if its file describes no leg.

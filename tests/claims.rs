@@ -139,6 +139,13 @@ fn ripples(formulation: &str, more: &str) -> String {
 const WAYPOINTS: &str = "[[goal.waypoints]]\nposition = [0.0, 0.1]\n\
     [[goal.waypoints]]\nposition = [0.15, 0.1]\ntime = 1.5\nyaw = 0.2\nheight = 0.43\n";
 
+/// What the motion takes place under.
+const CONDITIONS: &str = "[posture]\nheight = [0.38, 0.46]\nroll = [-0.2, 0.2]\npitch = [-0.2, 0.2]\n\
+    [payload]\nmass = 4.0\nposition = [0.05, 0.02, 0.1]\n\
+    [[force]]\nvector = [20.0, -10.0, 0.0]\nfrom = 0.8\nuntil = 2.2\npoint = [0.1, 0.0, 0.1]\n\
+    [[foothold]]\nfoot = \"LF\"\nstep = 1\nposition = [0.4, 0.28]\n\
+    [[keep_out]]\npolygon = [[0.45, -0.2], [0.6, -0.3], [0.65, -0.1]]\n";
+
 #[test]
 fn every_member_is_covered_by_a_law() {
     let folder = tempfile::tempdir().unwrap();
@@ -152,6 +159,7 @@ fn every_member_is_covered_by_a_law() {
         rubble(folder.path(), "hybrid", false, ""),
         ripples("hybrid", "[gait]\ncycle = 1.2\nduty = 0.75\n").replace("anymal_towr", "anymal_c"),
         ripples("direct", WAYPOINTS),
+        ripples("hybrid", CONDITIONS).replace("[-0.1, 0.0]", "[-0.1, 0.0]\nyaw = 0.1"),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();

@@ -215,6 +215,32 @@ fn way_points_match_differences() {
     }
 }
 
+/// Posture, payload, forces on the trunk, fixed footholds and polygons, for massless and massive legs.
+#[test]
+fn conditions_match_differences() {
+    let extra = "[posture]\nheight = [0.3, 0.6]\nroll = [-0.2, 0.3]\npitch = [-0.3, 0.2]\n\
+                 [payload]\nmass = 5.0\nposition = [0.1, -0.05, 0.2]\n\
+                 [[force]]\nvector = [40.0, -30.0, 20.0]\nfrom = 0.3\nuntil = 2.0\npoint = [0.2, 0.1, -0.1]\n\
+                 [[foothold]]\nfoot = \"LF\"\nstep = 1\nposition = [0.8, 0.4]\n\
+                 [[keep_out]]\npolygon = [[0.5, -0.3], [1.1, -0.2], [0.7, 0.1]]\n";
+    for formulation in ["warped", "direct", "hybrid"] {
+        for (terrain, text) in [TERRAINS[0], TERRAINS[4]] {
+            for robot in ["anymal_towr", "anymal_c"] {
+                let problem = problem_of(robot, text, formulation, extra);
+                let rows = |name: &str| {
+                    let found = problem.blocks().find(|(block, _)| block.name() == name);
+                    found.map_or(0, |(block, _)| block.rows())
+                };
+                assert_eq!([rows("posture"), rows("fixed footholds")], [4 * 50, 2]);
+                assert!(rows("keep out") >= 8 && problem.model.applied(20).len() == 1);
+                check(problem, &format!("{robot}, {terrain}, {formulation}"));
+            }
+        }
+    }
+    let law = format!("{extra}[physics]\nlaw = \"newton-euler\"\n");
+    check(problem(TERRAINS[4].1, "hybrid", &law), "newton-euler with conditions");
+}
+
 #[test]
 fn other_laws_and_cones_match_differences() {
     for formulation in ["warped", "direct", "hybrid"] {

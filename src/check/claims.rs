@@ -30,6 +30,10 @@ pub(super) fn asked_robot(plan: &Plan, scenario: &Scenario) -> Result<MetaRobot>
         return Ok(MetaRobot { friction, gravity: GRAVITY, ..stated.clone() });
     }
     let robot = Robot::load(&scenario.robot, Path::new("."))
+        .and_then(|robot| match &scenario.payload {
+            Some(payload) => robot.with_payload(payload.mass, payload.position),
+            None => Ok(robot),
+        })
         .map_err(|e| Error::input(format!("meta.scenario: {e}")))?;
     Ok(MetaRobot {
         name: robot.name.clone(),

@@ -127,12 +127,15 @@ fn forces(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>, resi
 /// Where feet may stand: within the terrain, and not on slopes that the scenario rules out.
 fn footholds(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
     let [x_min, x_max, y_min, y_max] = s.ground.extent();
-    let (mut outside, mut steep) = (Worst::default(), Worst::default());
+    let (mut outside, mut steep, mut kept) = (Worst::default(), Worst::default(), Worst::default());
     for (n, e) in s.sample_feet().filter(|&(n, e)| s.in_contact(n, e)) {
         let [x, y, _] = s.foot_position(n, e);
         if !s.ground.covers(x, y) {
             let beyond = |v: f64, low: f64, high: f64| larger(larger(low - v, v - high), 0.0);
             outside.meet(1e3 * beyond(x, x_min, x_max).hypot(beyond(y, y_min, y_max)), n, Some(e));
+        }
+        for polygon in &s.scenario.keep_out {
+            kept.meet(-1e3 * polygon.distance([x, y]), n, Some(e));
         }
         if let Some(most) = s.scenario.contact.max_slope {
             let margin = s.scenario.contact.edge_margin;
@@ -145,6 +148,9 @@ fn footholds(s: &Subject, stances: &[Vec<usize>], findings: &mut Vec<Finding>) {
         }
     }
     findings.push((laws::INSIDE, outside));
+    if !s.scenario.keep_out.is_empty() {
+        findings.push((laws::KEEP_OUT, kept));
+    }
     if s.scenario.contact.max_slope.is_some() {
         findings.push((laws::FOOTHOLD_SLOPE, steep));
     }

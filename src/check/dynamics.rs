@@ -37,16 +37,27 @@ fn report(
     findings.push((most, worst));
 }
 
-/// Σf + m g.
+/// Σf + m g, the scenario's forces included.
 fn total_force(s: &Subject, n: usize) -> [f64; 3] {
     let robot = &s.robot;
-    (0..s.feet).fold(scale(robot.mass, robot.gravity), |sum, e| add(sum, s.foot_force(n, e)))
+    let feet = (0..s.feet).fold(scale(robot.mass, robot.gravity), |sum, e| add(sum, s.foot_force(n, e)));
+    applied(s, n).fold(feet, |sum, (_, force)| add(sum, force))
 }
 
 /// Σ(pᵢ − p) × fᵢ.
 fn total_torque(s: &Subject, n: usize) -> [f64; 3] {
     let base = s.plan.base_position[n];
-    (0..s.feet).fold([0.0; 3], |sum, e| add(sum, cross(sub(s.foot_position(n, e), base), s.foot_force(n, e))))
+    let feet = (0..s.feet)
+        .fold([0.0; 3], |sum, e| add(sum, cross(sub(s.foot_position(n, e), base), s.foot_force(n, e))));
+    applied(s, n).fold(feet, |sum, (arm, force)| add(sum, cross(arm, force)))
+}
+
+/// Where the scenario's forces on the trunk act at a sample, from the center of mass, m, and what they are, N; world frame.
+fn applied(s: &Subject, n: usize) -> impl Iterator<Item = ([f64; 3], [f64; 3])> {
+    s.scenario.force.iter().map(move |force| {
+        let arm = rotate(s.plan.base_quaternion_wxyz[n], s.on_trunk(n, force.point));
+        (arm, scale(force.fraction(s.plan.t[n], s.scenario.time_step), force.vector))
+    })
 }
 
 /// (1, 4, 1)/6 around sample n.

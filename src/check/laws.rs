@@ -91,6 +91,7 @@ laws! {
         "the torso's underside keeps motion.base_clearance from the ground (allowance: 0.2 mm)";
     FOOTHOLD_SLOPE = "foothold_slope", "1", Some(0.01), None, "slope of a foothold beyond contact.max_slope";
     INSIDE = "inside", "mm", Some(0.0), None, "distance of a standing foot beyond the edge of the terrain";
+    KEEP_OUT = "keep_out", "mm", Some(0.0), None, "how deep the middle of a standing foot is inside a polygon of [[keep_out]]";
     PATCH = "patch", "mm", Some(1.0), None, "distance of a standing foot beyond the sides of its patch";
     PATCH_COUNT = "patch_count", "1", Some(0.0), None, "every stance has a patch";
     PATCH_ROUGHNESS = "patch_roughness", "mm", Some(15.0), None,
@@ -113,6 +114,9 @@ laws! {
     WAYPOINT_YAW = "waypoint_yaw", "rad", Some(1e-3), None, "difference from the yaw of way-points at their times";
     HEIGHT = "height", "mm", Some(1.0), None,
         "difference from goal.height at the end, and from the height of way-points at their times, over the mean of the feet";
+    POSTURE_HEIGHT = "posture_height", "mm", Some(1.0), None, "height over the mean of the feet beyond posture.height";
+    POSTURE_TILT = "posture_tilt", "rad", Some(2e-3), None, "roll or pitch beyond posture.roll and posture.pitch";
+    FIXED_FOOTHOLD = "fixed_foothold", "mm", Some(1.0), None, "distance of footholds from those that the scenario gives";
     BASE_JUMP = "base_jump", "mm", Some(0.5), None, "the base position has no jumps";
     FOOT_JUMP = "foot_jump", "mm", Some(0.5), None, "the foot positions have no jumps";
     FORCE_JUMP = "force_jump", "% m g", Some(3.0), None, "the forces have no jumps, not even at lift-off and touch-down";

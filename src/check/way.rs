@@ -1,7 +1,8 @@
-//! The way: start, goal and way-points.
+//! The way: start, goal, way-points, fixed footholds, and the posture on it.
 
 use super::laws;
-use super::subject::{Finding, Subject, Worst};
+use super::patches::stance_numbers;
+use super::subject::{Finding, Subject, Worst, larger};
 use super::vector::{dot, rotate};
 use crate::scenario::Stop;
 
@@ -9,6 +10,8 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     ends(s, findings);
     stops(s, findings);
     heights(s, findings);
+    posture(s, findings);
+    fixed_footholds(s, findings);
 }
 
 /// Distance of the base from a place at a sample, seen from above, mm.
@@ -97,6 +100,53 @@ fn stops(s: &Subject, findings: &mut Vec<Finding>) {
 /// The sample at a time, s.
 fn sample(s: &Subject, time: f64) -> usize {
     ((time / s.step).round() as usize).min(s.samples - 1)
+}
+
+/// Limits of the torso's posture.
+fn posture(s: &Subject, findings: &mut Vec<Finding>) {
+    let spec = &s.scenario.posture;
+    let beyond =
+        |value: f64, [least, greatest]: [f64; 2]| larger(larger(least - value, value - greatest), 0.0);
+    if let Some(range) = spec.height {
+        let mut worst = Worst::default();
+        (0..s.samples).for_each(|n| worst.meet(1e3 * beyond(s.height_over_feet(n), range), n, None));
+        findings.push((laws::POSTURE_HEIGHT, worst));
+    }
+    if spec.roll.is_some() || spec.pitch.is_some() {
+        let mut worst = Worst::default();
+        for n in 0..s.samples {
+            let up = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|axis| rotate(s.plan.base_quaternion_wxyz[n], axis)[2]);
+            let (roll, pitch) = (up[1].atan2(up[2]), -up[0].clamp(-1.0, 1.0).asin());
+            for (angle, range) in [(roll, spec.roll), (pitch, spec.pitch)] {
+                worst.meet(range.map_or(0.0, |range| beyond(angle, range)), n, None);
+            }
+        }
+        findings.push((laws::POSTURE_TILT, worst));
+    }
+}
+
+/// Whether the stances whose footholds are given are there.
+fn fixed_footholds(s: &Subject, findings: &mut Vec<Finding>) {
+    if s.scenario.foothold.is_empty() {
+        return;
+    }
+    let mut worst = Worst::default();
+    for spec in &s.scenario.foothold {
+        let at = s.plan.foot_names.iter().position(|name| *name == spec.foot).and_then(|e| {
+            let (number, then) = (stance_numbers(s, e), sample(s, spec.time.unwrap_or(0.0)));
+            let meant = |n: usize| spec.step.map_or(n == then, |step| number[n] == step);
+            (0..s.samples).find(|&n| s.in_contact(n, e) && meant(n)).map(|n| (n, e))
+        });
+        match at {
+            Some((n, e)) => {
+                let [x, y, _] = s.foot_position(n, e);
+                worst.meet(1e3 * (x - spec.position[0]).hypot(y - spec.position[1]), n, Some(e));
+            }
+            None => worst.meet(f64::INFINITY, 0, None),
+        }
+    }
+    findings.push((laws::FIXED_FOOTHOLD, worst));
 }
 
 /// Heights over the feet where they are given.

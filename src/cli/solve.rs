@@ -50,6 +50,9 @@ pub(super) struct SolveArguments {
     /// The drawing of the plan to write, an SVG file [default: NAME.svg next to the plan]
     #[arg(long, value_name = "FILE", conflicts_with = "no_plot")]
     plot: Option<PathBuf>,
+    /// Do not look for the limits that would have to give when no motion is found
+    #[arg(long)]
+    no_explain: bool,
     /// Draw nothing
     #[arg(long)]
     no_plot: bool,
@@ -103,6 +106,9 @@ pub(super) fn solve(arguments: &SolveArguments, console: &Console) -> Result<End
 fn load(arguments: &SolveArguments) -> Result<LoadedScenario> {
     let mut overrides = arguments.set.clone();
     overrides.extend(arguments.formulation.as_ref().map(|name| format!("formulation={name}")));
+    if arguments.no_explain {
+        overrides.push("solver.explain=false".into());
+    }
     scenario::load(&arguments.scenario, &overrides)
 }
 
@@ -150,8 +156,10 @@ fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
         ),
         _ => String::new(),
     };
+    let why = motion.explanation.as_ref();
+    let why = why.map_or(String::new(), |why| format!("\nWhat would have to give: {}.", why.sentences()));
     format!(
-        "{verdict}: {} after {} iterations; {}.{advice}\n\
+        "{verdict}: {} after {} iterations; {}.{advice}{why}\n\
          {total} s in total: map {map} s, evaluation {evaluation} s, linear solver {linear} s.\n\
          Written: {}",
         motion.status,
@@ -172,6 +180,7 @@ fn object(planned: &Planned, output: &Path, plot: Option<&Path>, no_plot: Option
         "passed": check.passed,
         "interrupted": motion.interrupted,
         "solver": plan.meta.solver,
+        "explanation": plan.meta.explanation,
         "terrain": prepared.ground.report,
         "map": map.as_ref().map(|built| json!({ "cached": built.cached, "report": built.report })),
         "violations": motion.violations,

@@ -16,6 +16,9 @@
 //! that is linear between samples, whose hat averages are zero and which vanishes at both ends of the motion, vanishes
 //! everywhere. At the first and the last sample the robot rests, and the row is the balance of forces there.
 //!
+//! Forces on the trunk (`[[force]]`) are known functions of time, linear between samples, and act at points R(t) (r − s) from the center of
+//! mass; they are added to those of the feet.
+//!
 //! λ is what the legs' own mass adds, averaged with the same hat: a known function of time and a term that follows the swinging feet, see
 //! [`crate::nlp::leg_terms`]; zero for massless legs.
 //!
@@ -134,6 +137,11 @@ impl Constraint for Dynamics {
             let mut torque = -model.leg_terms.torque(k);
             for &(l, weight) in &stencil.wrench {
                 let p = state.base[l].position();
+                for [f, point] in model.applied(l) {
+                    force += f * weight;
+                    let arm = state.base[l].rotation() * (point - model.leg_terms.shift(l));
+                    torque += arm.cross(f) * weight;
+                }
                 for i in 0..model.feet() {
                     if let Some((j, _)) = model.layout.force(i, l) {
                         let f = state.forces[i][l] * weight;
@@ -171,6 +179,15 @@ impl Constraint for Dynamics {
             for &(l, weight) in &stencil.wrench {
                 let base = &state.base[l];
                 let mut total = Vector3::zeros();
+                for [f, point] in model.applied(l) {
+                    // (δ × a) × f = −[f] [δ] a = [f] [a] δ.
+                    let arm = base.rotation() * (point - model.leg_terms.shift(l));
+                    let form = cross_matrix(f) * cross_matrix(&arm) * weight;
+                    let turn = Tangent::turn(model, base, &layout.base[l]);
+                    for c in 0..3 {
+                        turn.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
+                    }
+                }
                 for i in 0..model.feet() {
                     let Some((j, force_node)) = state.force_node(model, i, l) else { continue };
                     let contact = &state.contacts[i][j];
@@ -273,6 +290,11 @@ impl Constraint for Dynamics {
         for l in 0..self.stencils.len() {
             let (by_force, by_torque) = self.wrench_multipliers(multipliers, l);
             let cross = cross_matrix(&by_torque);
+            for [f, point] in model.applied(l) {
+                // λ · (R r × f) = (f × λ) · R r.
+                let arm = point - model.leg_terms.shift(l);
+                curvature.base_rotation[l] += f.cross(&by_torque) * arm.transpose();
+            }
             for i in 0..model.feet() {
                 let Some((j, _)) = state.force_node(model, i, l) else { continue };
                 let arm = state.contacts[i][j].point.position - state.base[l].position();

@@ -16,6 +16,10 @@ pub const BASE_CLEARANCE: f64 = 0.01;
 pub const KNEE_CLEARANCE: f64 = 0.02;
 /// Between the shank's tube and ground with edges, m: the surface for it has a margin to the sides already.
 pub const SHANK_CLEARANCE: f64 = 0.01;
+/// On each side of the height over the feet in `[posture]`, m: for what happens between the samples.
+pub const POSTURE_HEIGHT: f64 = 0.001;
+/// The same for roll and pitch, rad.
+pub const POSTURE_TILT: f64 = 0.002;
 /// Fraction of a joint's speed limit that a plan uses. The rest is for what happens between samples and for what the plan
 /// does not know: the legs' own mass moves the trunk relative to the center of mass.
 pub const JOINT_SPEED: f64 = 0.72;

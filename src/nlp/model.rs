@@ -6,7 +6,7 @@ use super::leg_terms::LegTerms;
 use crate::leg::Leg;
 use crate::leg::body::Body;
 use crate::robot::{Box3, Foot, Robot};
-use crate::scenario::{Legs, Scenario, Stop};
+use crate::scenario::{FootholdSpec, ForceSpec, Legs, Scenario, Stop};
 use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::layout::KnotSpacing;
 use crate::trajectory::spline::SwingShape;
@@ -33,6 +33,51 @@ pub struct Visit {
     pub stop: Stop,
     /// How near, if the stop has no time, m.
     pub distance: f64,
+}
+
+/// Where a stance must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedFoothold {
+    /// i.
+    pub foot: usize,
+    /// j.
+    pub stance: usize,
+    /// x, y, m.
+    pub position: [f64; 2],
+}
+
+/// The fixed footholds of a scenario; none where the gait has no such step.
+pub fn fixed_footholds(scenario: &Scenario, robot: &Robot, gait: &Gait) -> Vec<Option<FixedFoothold>> {
+    let find = |spec: &FootholdSpec| {
+        let foot = robot.feet.iter().position(|foot| foot.name == spec.foot)?;
+        let stances = gait.stances(foot);
+        let stance = match (spec.step, spec.time) {
+            (Some(step), _) => step,
+            (None, Some(time)) => {
+                let k = time / scenario.time_step;
+                stances.iter().position(|stance| (stance.start..=stance.end).contains(&k))?
+            }
+            (None, None) => return None,
+        };
+        (stance < stances.len()).then_some(FixedFoothold { foot, stance, position: spec.position })
+    };
+    scenario.foothold.iter().map(find).collect()
+}
+
+/// The forces on the trunk at each sample.
+fn applied(scenario: &Scenario, mass: f64, intervals: usize) -> Vec<Vec<[Vector3<f64>; 2]>> {
+    if scenario.force.is_empty() {
+        return Vec::new();
+    }
+    let at = |k: usize| {
+        let fraction = |force: &ForceSpec| force.fraction(k as f64 * scenario.time_step, scenario.time_step);
+        let acting = scenario.force.iter().filter(|force| fraction(force) > 0.0);
+        let value = |force: &ForceSpec| {
+            [Vector3::from(force.vector) * (fraction(force) / (mass * GRAVITY)), Vector3::from(force.point)]
+        };
+        acting.map(value).collect()
+    };
+    (0..=intervals).map(at).collect()
 }
 
 /// Robot, ground, space and layout. Units of the NLP: m, s, forces in m g, torques in m g · 1 m.
@@ -68,6 +113,10 @@ pub struct Model {
     pub patches: Vec<Vec<Patch>>,
     /// When the base is where on its way.
     pub visits: Vec<Visit>,
+    /// Footholds whose place is given.
+    pub fixed: Vec<FixedFoothold>,
+    /// By sample, forces on the trunk, world frame, m g, and where they act, base frame as in `nominal`, m. Empty where there are none.
+    pub applied: Vec<Vec<[Vector3<f64>; 2]>>,
     /// The spaces of the variables.
     pub spaces: Spaces,
     /// The variables.
@@ -113,6 +162,8 @@ impl Model {
             surfaces,
             patches: Vec::new(),
             visits: Vec::new(),
+            fixed: fixed_footholds(scenario, robot, gait).into_iter().flatten().collect(),
+            applied: applied(scenario, robot.mass, gait.intervals),
             spaces,
             threads: scenario.solver.threads,
             layout: Layout::new(
@@ -130,6 +181,11 @@ impl Model {
     /// The patch of a stance, where there is one.
     pub fn patch(&self, foot: usize, stance: usize) -> Option<&Patch> {
         self.patches.get(foot).map(|stances| &stances[stance])
+    }
+
+    /// The forces on the trunk at sample k, and where they act.
+    pub fn applied(&self, k: usize) -> &[[Vector3<f64>; 2]] {
+        self.applied.get(k).map_or(&[], Vec::as_slice)
     }
 
     /// Number of feet.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::digest::sha256_hex;
 use crate::heightfield::Grid;
 use crate::leg::LegSpec;
-use crate::planner::Seconds;
+use crate::planner::{Explanation, Seconds};
 use crate::robot::{Box3, Robot};
 use crate::scenario::{Formulation, Legs, Scenario};
 use crate::warp::MapGrid;
@@ -176,6 +176,9 @@ pub struct Meta {
     pub limits: Option<MetaLimits>,
     /// How the solve went.
     pub solver: MetaSolver,
+    /// Why no motion was found, where that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explanation: Option<Explanation>,
     /// The results of the check.
     pub checks: Vec<CheckRow>,
     /// File name → SHA-256.

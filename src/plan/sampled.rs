@@ -180,6 +180,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
                 ..motion.seconds
             },
         },
+        explanation: motion.explanation.clone(),
         checks: vec![],
         inputs: loaded.inputs.iter().chain(&provenance.ground.inputs).cloned().collect(),
     }

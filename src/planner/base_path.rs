@@ -5,12 +5,12 @@ use nalgebra::{Vector2, Vector3};
 
 use super::pace::{Pace, interpolated};
 use super::retiming::{Corridor, retimed};
-use super::standing::{Pose, ensure_reach, pulled_back, standing_pose};
+use super::standing::{Pose, allowed, ensure_reach, pulled_back, standing_pose};
 use super::way::{Place, Way};
 use crate::Result;
 use crate::nlp::Model;
 use crate::nlp::model::Visit;
-use crate::scenario::{Scenario, wrapped};
+use crate::scenario::{PostureSpec, Scenario, wrapped};
 use crate::terrain::Patch;
 use crate::trajectory::Stance;
 use crate::trajectory::rotation::euler_angles;
@@ -29,6 +29,7 @@ pub struct BasePath<'a> {
     /// Poses at the start and at the goal, in the variables.
     pub ends: [[f64; 6]; 2],
     way: Way,
+    posture: PostureSpec,
     /// The base in the variables at each place of a way that is not straight, if the variables are not ambient.
     bent: Option<Vec<[f64; 6]>>,
     pace: Pace,
@@ -79,15 +80,14 @@ impl<'a> BasePath<'a> {
     pub fn new(scenario: &Scenario, model: &'a Model) -> Result<Self> {
         let layout = &model.layout;
         let feet = model.nominal.iter().map(|n| n.xy().norm()).fold(0.0, f64::max);
-        let way = Way::new(scenario, model.size, feet);
-        let in_variables = |[x, y, heading]: Place| {
-            pulled_back(
-                &model.spaces.base,
-                &standing_pose(&model.nominal, &model.surfaces.posture, [x, y], heading),
-            )
+        let way = Way::new(scenario, &model.surfaces.bends, model.size, feet);
+        let standing = |[x, y, heading]: Place, height: Option<f64>| {
+            let pose = standing_pose(&model.nominal, &model.surfaces.posture, [x, y], heading);
+            allowed(pose, model, &scenario.posture, height)
         };
+        let in_variables = |place: Place| pulled_back(&model.spaces.base, &standing(place, None));
         let [start, goal] = [way.at(0.0), way.at(way.length)];
-        let pose = standing_pose(&model.nominal, &model.surfaces.posture, scenario.start.position, start[2]);
+        let pose = standing(start, None);
         ensure_reach(model, &pose, scenario.start.position)?;
         let first = pulled_back(&model.spaces.base, &pose)?;
         let unwound = |mut y: [f64; 6], heading: f64| {
@@ -95,7 +95,8 @@ impl<'a> BasePath<'a> {
             y[5] = expected + wrapped(y[5] - expected);
             y
         };
-        let last = unwound(in_variables(goal)?, goal[2]);
+        let last = pulled_back(&model.spaces.base, &standing(goal, scenario.goal.height))?;
+        let last = unwound(last, goal[2]);
         let bent = (model.spaces.base.is_warped() && !way.is_straight()).then(|| {
             way.places().map(|(_, place)| Ok(unwound(in_variables(*place)?, place[2]))).collect::<Result<_>>()
         });
@@ -114,6 +115,7 @@ impl<'a> BasePath<'a> {
             .collect();
         let path = Self {
             model,
+            posture: scenario.posture.clone(),
             ends: [first, last],
             length: way.length,
             pace: Pace::new([depart, arrive], way.length, &stops, layout.intervals, layout.time_step),
@@ -264,7 +266,8 @@ impl<'a> BasePath<'a> {
         }
         // Seen from above along the way, standing on the ground at every instant.
         let [x, y, heading] = self.way.at(u * self.length);
-        let pose: Pose = standing_pose(&self.model.nominal, &self.model.surfaces.posture, [x, y], heading);
+        let pose = standing_pose(&self.model.nominal, &self.model.surfaces.posture, [x, y], heading);
+        let pose = allowed(pose, self.model, &self.posture, None);
         let angles = euler_angles(&pose.rotation);
         let expected = first[5] + heading - self.way.at(0.0)[2];
         [x, y, pose.position.z, angles.x, angles.y, expected + wrapped(angles.z - expected)]

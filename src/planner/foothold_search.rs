@@ -14,11 +14,12 @@
 
 use std::collections::HashSet;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::base_path::{BasePath, FootMotion, REACH_MARGIN, middle};
 use super::standing::Pose;
 use crate::nlp::Model;
+use crate::nlp::model::FixedFoothold;
 use crate::terrain::ContactGround;
 use crate::{Error, Result};
 
@@ -106,6 +107,8 @@ pub struct Search<'a> {
     largest_steps: Vec<[f64; 2]>,
     /// By foot, for each pose of the way.
     tracks: Vec<Vec<Option<Place>>>,
+    /// Stances whose place is given, by foot and number.
+    fixed: Vec<(usize, usize, Place)>,
     history: Vec<Touchdown>,
 }
 
@@ -132,6 +135,7 @@ impl<'a> Search<'a> {
             motions: vec![],
             largest_steps: (0..model.feet()).map(|foot| largest_step(model, path, foot)).collect(),
             tracks: vec![],
+            fixed: vec![],
             history: vec![],
         };
         search.motions = (0..model.feet())
@@ -176,6 +180,7 @@ impl<'a> Search<'a> {
     /// # Errors
     /// Where a foot finds nothing to stand on.
     pub fn run(mut self) -> Result<(Vec<Vec<Place>>, f64)> {
+        self.fixed = self.fixed_places()?;
         let start = self.at_rest()?;
         let mut beam = vec![start.clone()];
         let mut standing = vec![true; self.model.feet()];
@@ -199,7 +204,7 @@ impl<'a> Search<'a> {
     fn at_rest(&self) -> Result<Partial> {
         let mut places = Vec::new();
         for foot in 0..self.model.feet() {
-            let from = self.places_around(foot, 0.0).into_iter().min_by(|a, b| {
+            let from = self.places_for(foot, 0, 0.0).into_iter().min_by(|a, b| {
                 let cost = |p: &Place| p.cost + p.s * p.s;
                 cost(a).total_cmp(&cost(b))
             });
@@ -261,7 +266,7 @@ impl<'a> Search<'a> {
             let wanted = (mid + KEPT_LAG * (at - begin)).min(self.path.length);
             let late = LATE * (at - begin).powi(2);
             nearest.get_or_insert(wanted);
-            for place in self.places_around(foot, wanted) {
+            for place in self.places_for(foot, stance, wanted) {
                 let mut interval = partial.interval;
                 let within_reach = self.within_reach(foot, &place);
                 let mut lacking = narrow(&mut interval, within_reach);
@@ -299,6 +304,38 @@ impl<'a> Search<'a> {
             }
         }
         Ok(extended)
+    }
+
+    /// The places of the stances that are given.
+    fn fixed_places(&self) -> Result<Vec<(usize, usize, Place)>> {
+        let place = |fixed: &FixedFoothold| {
+            let [x, y] = fixed.position;
+            let Some(cell) = self.contact.steppable_cell([x, y]) else {
+                let what = format!(
+                    "given [{x}, {y}], where {} cannot stand: the ground there is a gap, too rough, too steep, kept free, or was not measured",
+                    self.model.foot_names[fixed.foot]
+                );
+                return Err(Error::key("foothold", what));
+            };
+            let nominal = |n: usize| {
+                let pose = &self.way[n];
+                (pose.position + pose.rotation * self.model.nominal[fixed.foot]).xy()
+            };
+            let off = |n: &usize| (nominal(*n) - Vector2::new(x, y)).norm();
+            let nearest = (0..self.way.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
+            let s = self.first + nearest as f64 * self.apart;
+            let place = Place { s, cell, point: Vector3::from(self.contact.point(cell)), cost: 0.0 };
+            Ok((fixed.foot, fixed.stance, place))
+        };
+        self.model.fixed.iter().map(place).collect()
+    }
+
+    /// The places that a stance of a foot may have around s.
+    fn places_for(&self, foot: usize, stance: usize, s: f64) -> Vec<Place> {
+        match self.fixed.iter().find(|fixed| (fixed.0, fixed.1) == (foot, stance)) {
+            Some((.., place)) => vec![*place],
+            None => self.places_around(foot, s),
+        }
     }
 
     /// The places of a foot's track around s.

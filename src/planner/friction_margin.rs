@@ -2,6 +2,7 @@
 
 use super::motion::Motion;
 use super::solve::{Host, Task, attempt};
+use super::why::attempt_or_explain;
 use crate::Result;
 use crate::scenario::{Effort, Scenario};
 
@@ -10,7 +11,7 @@ use crate::scenario::{Effort, Scenario};
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
 pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
-    let motion = attempt(task, host)?;
+    let motion = attempt_or_explain(task, host)?;
     advise(task, host, motion)
 }
 
@@ -26,6 +27,7 @@ fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
         let mut scenario: Scenario = task.scenario.clone();
         scenario.contact.friction_margin = margin;
         scenario.solver.effort = Effort::Feasible;
+        scenario.solver.explain = false;
         attempt(&Task { scenario: &scenario, ..*task }, host)
     };
     let without = with_margin(0.0)?;

@@ -59,6 +59,10 @@ fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Ve
                     let [x, y] = patch.center;
                     pulled_back(&model.spaces.feet, &Vector3::new(x, y, patch.height))?
                 }
+                None if let Some([x, y]) = fixed(model, i, j) => {
+                    let height = model.surfaces.feet.height(x, y);
+                    pulled_back(&model.spaces.feet, &Vector3::new(x, y, height))?
+                }
                 None => foothold_under(model, i, &path.at(middle(&stance.stance, last) * layout.time_step)),
             };
             x[stance.foothold.first()..][..3].copy_from_slice(foothold.as_slice());
@@ -67,6 +71,12 @@ fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Ve
         footholds.push(on_ground.collect::<Result<_>>()?);
     }
     Ok(footholds)
+}
+
+/// Where a stance must be, x and y.
+fn fixed(model: &Model, foot: usize, stance: usize) -> Option<[f64; 2]> {
+    let fixed = model.fixed.iter().find(|fixed| (fixed.foot, fixed.stance) == (foot, stance));
+    fixed.map(|fixed| fixed.position)
 }
 
 /// Control points of the swings, evenly spaced from foothold to foothold, lifted to the apex.
@@ -163,7 +173,10 @@ fn bearing_feet(model: &Model) -> Vec<f64> {
 /// Where foot `i` would stand under a base with variables y, in the space of the variables.
 fn foothold_under(model: &Model, i: usize, y: &[f64; 6]) -> Vector3<f64> {
     let (point, turn) = model.spaces.base.pose(y, false);
-    let q = point.position + turn.rotation * model.nominal[i];
+    let mut q = point.position + turn.rotation * model.nominal[i];
+    if let Some(keep_out) = &model.surfaces.keep_out {
+        [q.x, q.y] = keep_out.moved_out([q.x, q.y]);
+    }
     match &model.spaces.feet {
         Space::Direct => Vector3::new(q.x, q.y, model.surfaces.feet.height(q.x, q.y)),
         Space::Warped(map) => {

@@ -288,6 +288,15 @@ impl<'a> BodyMotion<'a> {
                 *torque += (foot.position - self.positions[n]).cross(&foot.force) * unit;
             }
         }
+        for (n, torque) in torques.iter_mut().enumerate() {
+            let (k, u) = (n / self.fine, (n % self.fine) as f64 / self.fine as f64);
+            let point = |point: &Vector3<f64>| self.rotations[n] * (point - self.postures[n].shift);
+            for (k, weight) in [(k, 1.0 - u), (k + 1, u)] {
+                let applied = self.model.applied(k).iter();
+                *torque +=
+                    applied.map(|[force, at]| point(at).cross(force)).sum::<Vector3<f64>>() * (weight * unit);
+            }
+        }
         torques
     }
 

@@ -15,6 +15,7 @@
 //! | [`mod@guess`] | where a solve starts |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | `friction_margin` | the same, and what a smaller margin of friction would do |
+//! | `elastic`, `why` | when no motion is found: which limits would have to give |
 //! | [`stage`] | which stages there are |
 //! | `stopping` | when a stage has done what its effort demands |
 //! | `options` | the options given to Ipopt |
@@ -25,6 +26,7 @@
 
 mod base_path;
 pub mod derivatives;
+mod elastic;
 mod foothold_search;
 mod footholds;
 mod friction_margin;
@@ -44,7 +46,9 @@ mod threads;
 mod travel;
 pub mod violation;
 mod way;
+mod why;
 
+pub use elastic::{Explanation, Shortfall};
 pub use friction_margin::solve;
 pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::elastic::Explanation;
 use super::legs::LegMotion;
 use super::violation::BlockViolation;
 use crate::ipopt::{IterationRecord, LinearSolver};
@@ -32,6 +33,8 @@ pub struct Motion {
     pub legs: Option<LegMotion>,
     /// How the solve ended, in words.
     pub status: String,
+    /// Why it is not solved, where that was found.
+    pub explanation: Option<Explanation>,
     /// Every constraint holds to the tolerance.
     pub solved: bool,
     /// By Ctrl-C, or by the host.

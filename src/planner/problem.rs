@@ -3,6 +3,7 @@
 use crate::constraints::base_clearance::BaseClearance;
 use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
+use crate::constraints::fixed_foothold::fixed_footholds;
 use crate::constraints::foothold_patch::FootholdPatch;
 use crate::constraints::foothold_slope::FootholdSlope;
 use crate::constraints::friction::Friction;
@@ -10,9 +11,11 @@ use crate::constraints::friction_conformal::FrictionConformal;
 use crate::constraints::goal::{goal, way_points};
 use crate::constraints::joint_speed::JointSpeed;
 use crate::constraints::joint_torque::JointTorque;
+use crate::constraints::keep_out::OutOfPolygons;
 use crate::constraints::knee_clearance::KneeClearance;
 use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
+use crate::constraints::posture::posture;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
 use crate::constraints::swing::SwingClearance;
@@ -22,7 +25,7 @@ use crate::costs::force_share::ForceShare;
 use crate::costs::posture::Posture;
 use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::{Multipliers, NlpProblem};
-use crate::scenario::{Cone, Law, Scenario};
+use crate::scenario::{Cone, Law, PostureSpec, Scenario};
 
 use nalgebra::Vector3;
 
@@ -99,6 +102,15 @@ impl GaitProblem {
             Box::new(BaseClearance::new(&model, motion.base_clearance)),
             Box::new(goal(&model, scenario)),
         ];
+        if scenario.posture != PostureSpec::default() {
+            blocks.push(Box::new(posture(&model, &scenario.posture)));
+        }
+        if let Some(keep_out) = &model.surfaces.keep_out {
+            blocks.push(Box::new(OutOfPolygons::new(&model, keep_out)));
+        }
+        if !model.fixed.is_empty() {
+            blocks.push(Box::new(fixed_footholds(&model)));
+        }
         if !model.visits.is_empty() {
             blocks.push(Box::new(way_points(&model)));
         }

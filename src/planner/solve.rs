@@ -2,9 +2,10 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::base_path::BasePath;
+use super::elastic::{self, Explanation};
 use super::guess;
 use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
@@ -15,7 +16,7 @@ use super::steps::Steps;
 use super::stopping::StoppingRule;
 use super::violation;
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, IterationRecord, LinearSolver, Multipliers, Status};
+use crate::ipopt::{self, INTERRUPT, IterationRecord, LinearSolver, Multipliers, Status};
 use crate::nlp::{LegTerms, Model};
 use crate::robot::Robot;
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
@@ -34,6 +35,8 @@ const PLAIN_FRACTION: f64 = 0.5;
 const LEG_ROUNDS: usize = 6;
 /// By how much the torque that it adds may still change, rms and at most, m g · 1 m.
 const LEG_TOLERANCE: [f64; 2] = [0.0015 * LEVER, 0.005 * LEVER];
+/// Looking for a reason takes as long as the solve at most, or this long if that is more, s.
+const LEAST_SECONDS: u64 = 10;
 /// m, with which torques are compared with the weight.
 const LEVER: f64 = 0.3;
 
@@ -126,7 +129,7 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let first = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
     let first = solve.with_leg_mass(first)?;
     if first.feasible || first.interrupted {
-        return Ok(solve.finish(first));
+        return Ok(solve.finish(first, None));
     }
     let (how, second) = match (over_edges, steps) {
         (true, _) => (
@@ -135,7 +138,7 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         ),
         (false, steps) => ("also with a continuation", solve.continuation(steps)?),
     };
-    Ok(solve.finish(match second {
+    let mut end = match second {
         None => first,
         Some(second) if second.feasible && second.stage.is_whole() => second,
         // Why nothing was found shows best in the solve that was not made easier.
@@ -144,7 +147,9 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
             interrupted: second.interrupted,
             ..first
         },
-    }))
+    };
+    let explanation = solve.explain(&mut end);
+    Ok(solve.finish(end, explanation))
 }
 
 /// Whether nothing could grow in a continuation.
@@ -295,7 +300,9 @@ impl<'a> Solve<'a> {
             },
         };
         let spaces = Spaces::of(scenario.formulation(), map)?;
-        let model = Model::new(scenario, robot, &steps.gait, Surfaces::one(ground), spaces);
+        let kept = surfaces.clone();
+        let lower = Surfaces { keep_out: kept.keep_out, bends: kept.bends, ..Surfaces::one(ground) };
+        let model = Model::new(scenario, robot, &steps.gait, lower, spaces);
         self.task.with_visits(model).map(Some)
     }
 
@@ -420,7 +427,26 @@ impl<'a> Solve<'a> {
         Ok(StageEnd { stage, problem, x, multipliers, mu, feasible, interrupted, status })
     }
 
-    fn finish(mut self, mut end: StageEnd) -> Motion {
+    /// Why a stage found no motion.
+    fn explain(&mut self, end: &mut StageEnd) -> Option<Explanation> {
+        let solver = &self.task.scenario.solver;
+        if !solver.explain || end.feasible || end.interrupted || self.interrupted {
+            return None;
+        }
+        let limit = self.start.elapsed().max(Duration::from_secs(LEAST_SECONDS));
+        let (host, before, mut stopped) = (&mut *self.host, self.iterations, false);
+        let shortfalls = elastic::shortfalls(&mut end.problem, &end.x, solver, limit, &mut |record| {
+            let iteration = before + record.iteration;
+            let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record });
+            stopped = flow.is_break();
+            flow
+        });
+        end.interrupted |= stopped || INTERRUPT.is_raised();
+        let shortfalls = shortfalls.filter(|shortfalls| !shortfalls.is_empty())?;
+        Some(Explanation { shortfalls, remedy: None })
+    }
+
+    fn finish(mut self, mut end: StageEnd, explanation: Option<Explanation>) -> Motion {
         end.interrupted |= self.interrupted;
         let violations = violation::table(&mut end.problem, &end.x);
         self.seconds.total = self.start.elapsed().as_secs_f64();
@@ -435,6 +461,7 @@ impl<'a> Solve<'a> {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,
             status: end.status,
+            explanation,
             legs,
             model: end.problem.model,
             x: end.x,

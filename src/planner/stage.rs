@@ -14,6 +14,8 @@ pub enum Stage {
         /// From 1.
         round: usize,
     },
+    /// With limits that give, to find out why no motion was found.
+    Why,
     /// With the terrain at `step / steps` of its height.
     Continuation {
         /// From 1 to `steps`.
@@ -27,7 +29,7 @@ impl Stage {
     /// The terrain's height in this stage, as a fraction of the scenario's.
     pub fn height_fraction(self) -> f64 {
         match self {
-            Self::WithoutJoints | Self::Whole | Self::LegMass { .. } => 1.0,
+            Self::WithoutJoints | Self::Whole | Self::LegMass { .. } | Self::Why => 1.0,
             Self::Continuation { step, steps } => f64::from(step) / f64::from(steps),
         }
     }
@@ -35,7 +37,7 @@ impl Stage {
     /// Whether every constraint of the scenario is there, on the whole terrain.
     pub fn is_whole(self) -> bool {
         match self {
-            Self::WithoutJoints => false,
+            Self::WithoutJoints | Self::Why => false,
             Self::Whole | Self::LegMass { .. } => true,
             Self::Continuation { step, steps } => step == steps,
         }
@@ -53,6 +55,7 @@ impl fmt::Display for Stage {
             Self::WithoutJoints => write!(f, "without joints"),
             Self::Whole => write!(f, "solve"),
             Self::LegMass { round } => write!(f, "legs with mass, {round}"),
+            Self::Why => write!(f, "why no motion is found"),
             Self::Continuation { .. } => {
                 write!(f, "continuation, terrain at {:.0} %", 100.0 * self.height_fraction())
             }

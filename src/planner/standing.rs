@@ -2,8 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::constraints::margins;
+use crate::constraints::posture::within;
 use crate::heightfield::Heightfield;
 use crate::nlp::Model;
+use crate::scenario::PostureSpec;
 use crate::trajectory::rotation::{euler, euler_angles, project_to_rotation};
 use crate::trajectory::space::Space;
 use crate::warp::Order;
@@ -56,6 +59,25 @@ pub fn standing_pose(nominal: &[Vector3<f64>], ground: &Heightfield, xy: [f64; 2
         let drop: f64 = nominal.iter().zip(&feet).map(|(n, q)| q.z - (pose.rotation * n).z).sum::<f64>();
         pose.position.z = drop / nominal.len() as f64;
     }
+    pose
+}
+
+/// A standing pose brought into the limits of a posture, and if one is given to a height over the feet, m.
+pub fn allowed(mut pose: Pose, model: &Model, posture: &PostureSpec, height: Option<f64>) -> Pose {
+    if *posture == PostureSpec::default() && height.is_none() {
+        return pose;
+    }
+    let own = -model.nominal.iter().map(|n| (pose.rotation * n).z).sum::<f64>() / model.feet() as f64;
+    let clamped = |value: f64, range: Option<[f64; 2]>, margin: f64| {
+        let range = range.map(|range| within(range, margin));
+        range.map_or(value, |[least, greatest]| value.clamp(least, greatest))
+    };
+    let wanted = clamped(height.unwrap_or(own), posture.height, model.size * margins::POSTURE_HEIGHT);
+    pose.position.z += wanted - own;
+    let mut angles = euler_angles(&pose.rotation);
+    angles.x = clamped(angles.x, posture.roll, margins::POSTURE_TILT);
+    angles.y = clamped(angles.y, posture.pitch, margins::POSTURE_TILT);
+    pose.rotation = euler(&angles).rotation;
     pose
 }
 

@@ -2,16 +2,45 @@
 
 use super::footholds::{Assignment, assign};
 use super::travel::{ensure_within_range, is_unhurried};
-use crate::Result;
 use crate::nlp::Model;
+use crate::nlp::model::fixed_footholds;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::terrain::{Patch, Surfaces};
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Spaces};
+use crate::{Error, Result};
 
 /// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
 const MORE_STEPS: f64 = 0.1;
+
+/// Those of some gaits that have the steps whose footholds are given.
+fn with_fixed(scenario: &Scenario, robot: &Robot, gaits: Vec<(f64, Gait)>) -> Result<Vec<(f64, Gait)>> {
+    let usual = gaits[0].1.clone();
+    let has = |gait: &Gait| fixed_footholds(scenario, robot, gait).iter().all(Option::is_some);
+    let gaits: Vec<(f64, Gait)> = gaits.into_iter().filter(|(_, gait)| has(gait)).collect();
+    if !gaits.is_empty() {
+        return Ok(gaits);
+    }
+    let missing = fixed_footholds(scenario, robot, &usual).iter().position(Option::is_none).unwrap_or(0);
+    let spec = &scenario.foothold[missing];
+    let foot = robot.feet.iter().position(|foot| foot.name == spec.foot).unwrap_or(0);
+    Err(match (spec.step, spec.time) {
+        (Some(step), _) => {
+            let steps = usual.swings[foot].len();
+            let what = format!("given {step}; in this gait, {} takes {steps} steps", spec.foot);
+            Error::key(format!("foothold[{missing}].step"), what)
+        }
+        (None, time) => {
+            let what = format!(
+                "given {} s, when {} is in the air in this gait; give a time at which it stands, or a step",
+                time.unwrap_or(0.0),
+                spec.foot
+            );
+            Error::key(format!("foothold[{missing}].time"), what)
+        }
+    })
+}
 
 /// What it costs, the gait, and `[foot][stance]` the cells of the contact surface.
 type Footing = (f64, Gait, Vec<Vec<usize>>);
@@ -35,6 +64,7 @@ impl Steps {
     pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
         let gaits = Gait::choices(scenario, robot)?;
         ensure_within_range(scenario, robot, &gaits)?;
+        let gaits = with_fixed(scenario, robot, gaits)?;
         let Some(contact) = &surfaces.contact else {
             let unhurried = gaits.iter().position(|(_, gait)| is_unhurried(scenario, robot, gait));
             let chosen = unhurried.unwrap_or(gaits.len() - 1);

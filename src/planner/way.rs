@@ -31,13 +31,13 @@ pub struct Way {
 }
 
 impl Way {
-    /// The way of a scenario for a robot of a size, whose feet are so far from its middle, m.
-    pub fn new(scenario: &Scenario, size: f64, feet: f64) -> Self {
-        let corners = Corners::of(scenario);
+    /// The way of a scenario for a robot of a size, whose feet are so far from its middle, m. It bends before each stop, and before the goal.
+    pub fn new(scenario: &Scenario, bends: &[Vec<[f64; 2]>], size: f64, feet: f64) -> Self {
+        let corners = Corners::of(scenario, bends);
         let distance = |a: &Place, b: &Place| (b[0] - a[0]).hypot(b[1] - a[1]) + feet * (b[2] - a[2]).abs();
-        let (places, stops) = match corners.stops.is_empty() {
-            true => (corners.places, Vec::new()),
-            false => rounded(&corners, size, distance),
+        let (places, stops) = match corners.places.len() {
+            2 => (corners.places, Vec::new()),
+            _ => rounded(&corners, size, distance),
         };
         let mut along = vec![0.0];
         for pair in places.windows(2) {
@@ -82,12 +82,15 @@ struct Corners {
 }
 
 impl Corners {
-    fn of(scenario: &Scenario) -> Self {
+    fn of(scenario: &Scenario, bends: &[Vec<[f64; 2]>]) -> Self {
         let stops = scenario.stops();
-        let points: Vec<[f64; 2]> = std::iter::once(scenario.start.position)
-            .chain(stops.iter().map(|stop| stop.position))
-            .chain([scenario.goal.position])
-            .collect();
+        // All points, and at which of them there is a stop.
+        let (mut points, mut stop_at) = (vec![scenario.start.position], Vec::new());
+        for n in 0..=stops.len() {
+            points.extend(bends.get(n).into_iter().flatten());
+            stop_at.extend(stops.get(n).map(|_| points.len()));
+            points.push(stops.get(n).map_or(scenario.goal.position, |stop| stop.position));
+        }
         let last = points.len() - 1;
         let directions = directions(&points);
         let mut along = vec![0.0];
@@ -98,7 +101,7 @@ impl Corners {
         // The points at which the heading is given, and what it is there.
         let start_yaw = scenario.start_yaw();
         let mut keys = vec![(0, Some(start_yaw))];
-        keys.extend(stops.iter().enumerate().filter_map(|(n, stop)| Some((n + 1, Some(stop.yaw?)))));
+        keys.extend(stops.iter().zip(&stop_at).filter_map(|(stop, n)| Some((*n, Some(stop.yaw?)))));
         keys.push((last, scenario.goal_yaw()));
         let whole_turn = scenario.goal.turns.and(scenario.turn()).map(|turn| start_yaw + turn);
         let mut heading = start_yaw;
@@ -123,7 +126,7 @@ impl Corners {
                 from + u * (to - from)
             };
             for n in first..end {
-                if n > 0 {
+                if stop_at.contains(&n) {
                     corners.stops.push(corners.places.len());
                 }
                 for (m, direction) in [(n, directions[n]), (n + 1, directions[n])] {
@@ -188,7 +191,7 @@ mod tests {
 
     fn way(ends: &str) -> Way {
         let text = format!("[terrain]\nkind = \"flat\"\n{ends}");
-        Way::new(&toml::from_str(&text).expect("a scenario"), 1.0, 0.4)
+        Way::new(&toml::from_str(&text).expect("a scenario"), &[], 1.0, 0.4)
     }
 
     #[test]

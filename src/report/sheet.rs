@@ -6,19 +6,25 @@ use super::ground::{DrawnGround, unknown_sample};
 use super::svg::{Font, Svg};
 use super::table::{check_counts, number};
 use crate::plan::Plan;
-use crate::scenario;
+use crate::scenario::{self, KeepOutSpec};
 use crate::terrain::Surfaces;
 
 /// A motion shorter than this has no direction to be viewed along, m.
 const MIN_LENGTH: f64 = 0.05;
 /// Histories up to this length are drawn with a dot for each iteration.
 const MAX_DOTS: usize = 60;
+/// Limits that would have to give, of which the place is shown.
+const MOST_SHORTFALLS: usize = 6;
 /// Names of failed checks in the heading.
 const MAX_NAMES: usize = 3;
 /// Style of the base's path.
 const BASE: &str = "stroke=\"#111\" stroke-width=\"2.4\"";
 /// Style of the surface that feet in the air clear.
 const CLEARED: &str = "stroke=\"#555\" stroke-width=\"1.1\" stroke-dasharray=\"4 3\"";
+/// Style of the way that the scenario asks for.
+const WAY: &str = "stroke=\"#111\" stroke-width=\"1.2\" stroke-dasharray=\"7 4\" stroke-opacity=\"0.7\"";
+/// Style of what is kept free of feet.
+const KEPT_FREE: &str = "fill=\"#b3261e\" fill-opacity=\"0.18\" stroke=\"#b3261e\" stroke-width=\"1.4\"";
 /// Height of the legends, pixels from the top.
 const LEGEND: f64 = 80.0;
 
@@ -112,6 +118,7 @@ fn stroke(foot: usize, width: f64) -> String {
 fn from_above(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4]) {
     let visited = |axis: usize| plan.base_position.iter().chain(&plan.foot_position).map(move |p| p[axis]);
     let axes = Axes::equal(frame, range(visited(0), 0.12), range(visited(1), 0.12));
+    let conditions = Asked::of(plan, ground.surfaces);
     ground.draw(svg, &axes);
     axes.draw(svg, "From above, ground shaded by height", "x, m", "y, m");
     svg.clipped(frame, |svg| {
@@ -130,23 +137,57 @@ fn from_above(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4])
                 svg.circle(axes.at(x, y), 4.0, &style);
             }
         }
+        for polygon in &conditions.keep_out {
+            svg.polygon(polygon.polygon.iter().map(|[x, y]| axes.at(*x, *y)), KEPT_FREE);
+        }
+        if conditions.way.len() > 2 {
+            svg.polyline(conditions.way.iter().map(|[x, y]| axes.at(*x, *y)), WAY);
+        }
         svg.polyline(plan.base_position.iter().map(|p| axes.at(p[0], p[1])), BASE);
         let [start, end] =
             [plan.base_position[0], plan.base_position[plan.t.len() - 1]].map(|p| axes.at(p[0], p[1]));
         svg.circle(start, 6.0, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"");
         svg.circle(end, 6.0, "fill=\"#111\" stroke=\"#fff\" stroke-width=\"1.5\"");
-        for [x, y] in waypoints(plan) {
-            let [u, v] = axes.at(x, y);
+        for shortfall in plan.meta.explanation.iter().flat_map(|why| &why.shortfalls).take(MOST_SHORTFALLS) {
+            let [u, v] = axes.at(shortfall.place[0], shortfall.place[1]);
+            svg.circle([u, v], 9.0, "fill=\"none\" stroke=\"#b3261e\" stroke-width=\"2.4\"");
+            svg.label(
+                [u + 12.0, v + 4.0],
+                &shortfall.words,
+                Font { color: "#b3261e", ..Font::TICK }.anchored("start"),
+            );
+        }
+        for [x, y] in &conditions.waypoints {
+            let [u, v] = axes.at(*x, *y);
             let diamond = [[u - 6.0, v], [u, v - 6.0], [u + 6.0, v], [u, v + 6.0]];
             svg.polygon(diamond, "fill=\"#fff\" stroke=\"#111\" stroke-width=\"1.8\"");
         }
     });
 }
 
-/// Where the scenario of a plan has way-points, x and y, m.
-fn waypoints(plan: &Plan) -> Vec<[f64; 2]> {
-    let scenario = scenario::parse("meta.scenario", &plan.meta.scenario);
-    scenario.map_or(Vec::new(), |scenario| scenario.goal.waypoints.iter().map(|w| w.position).collect())
+/// What the scenario of a plan asks for, x and y, m.
+#[derive(Default)]
+struct Asked {
+    /// Where the way goes straight in between.
+    way: Vec<[f64; 2]>,
+    waypoints: Vec<[f64; 2]>,
+    keep_out: Vec<KeepOutSpec>,
+}
+
+impl Asked {
+    fn of(plan: &Plan, surfaces: &Surfaces) -> Self {
+        let Ok(scenario) = scenario::parse("meta.scenario", &plan.meta.scenario) else {
+            return Self::default();
+        };
+        let mut way = vec![scenario.start.position];
+        let stops = scenario.stops().into_iter().map(|stop| stop.position).chain([scenario.goal.position]);
+        for (n, stop) in stops.enumerate() {
+            way.extend(surfaces.bends.get(n).into_iter().flatten());
+            way.push(stop);
+        }
+        let waypoints = scenario.goal.waypoints.iter().map(|w| w.position).collect();
+        Self { way, waypoints, keep_out: scenario.keep_out }
+    }
 }
 
 /// Index and position of each sample of one foot.

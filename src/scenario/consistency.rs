@@ -3,6 +3,7 @@
 //! The schema has already checked keys, types and ranges. Only two kinds of refusal come later: what depends on the
 //! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
 
+use super::condition_checks;
 use super::format::{Formulation, Scenario};
 use super::gait_kind::GaitKind;
 use super::map::MapMethod;
@@ -34,6 +35,7 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     if let Some(robot) = robot {
         legs(document, scenario, robot)?;
     }
+    condition_checks::check(document, scenario, robot)?;
     map(document, scenario)?;
     sequence::check(document, &scenario.gait, scenario.horizon)?;
     durations(document, scenario)?;

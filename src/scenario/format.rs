@@ -5,8 +5,10 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::conditions::{FootholdSpec, ForceSpec, PayloadSpec, PostureSpec};
 use super::gait::GaitSpec;
 use super::goal::GoalSpec;
+use super::keep_out::KeepOutSpec;
 use super::map::MapSpec;
 use super::motion::{ContactSpec, DiscretizationSpec, Footholds, Legs, MotionSpec, PhysicsSpec, StartSpec};
 use super::solver::SolverSpec;
@@ -47,6 +49,21 @@ pub struct Scenario {
     /// Clearances, limits of force and weights of smoothness.
     #[serde(default)]
     pub motion: MotionSpec,
+    /// Limits of the torso's height and tilt.
+    #[serde(default)]
+    pub posture: PostureSpec,
+    /// A mass on the trunk.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<PayloadSpec>,
+    /// Forces on the trunk.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force: Vec<ForceSpec>,
+    /// Where no foot may stand.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keep_out: Vec<KeepOutSpec>,
+    /// Footholds whose place is given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub foothold: Vec<FootholdSpec>,
     /// Friction and footholds.
     #[serde(default)]
     pub contact: ContactSpec,

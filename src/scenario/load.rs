@@ -120,6 +120,12 @@ fn assemble(
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
     way::check_speed(&document, &scenario, &robot)?;
     let by_size = set_by_size(&mut document, &scenario, robot.size())?;
+    let robot = match &scenario.payload {
+        Some(payload) => {
+            robot.with_payload(payload.mass, payload.position).map_err(|e| located(&document, e))?
+        }
+        None => robot,
+    };
     let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
     let by_gait = set_by_gait(&mut document, &scenario)?;
     let changed = by_size || by_speed || by_gait;

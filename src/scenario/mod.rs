@@ -3,12 +3,15 @@
 //! One file per group of tables; `format.rs` is the whole file. The types state keys, ranges and defaults; the
 //! JSON Schema and most error messages are derived from them. `consistency.rs` refuses values that do not fit together.
 
+mod condition_checks;
+mod conditions;
 mod consistency;
 pub mod examples;
 mod format;
 mod gait;
 mod gait_kind;
 mod goal;
+mod keep_out;
 mod load;
 mod map;
 mod motion;
@@ -23,10 +26,12 @@ mod tests;
 mod way;
 
 pub use crate::robot::RobotSpec;
+pub use conditions::{FootholdSpec, ForceSpec, PayloadSpec, PostureSpec};
 pub use format::{Formulation, Scenario, json_schema};
 pub use gait::GaitSpec;
 pub use gait_kind::GaitKind;
 pub use goal::{CircleSpec, GoalSpec, WaypointSpec};
+pub use keep_out::KeepOutSpec;
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
 pub use motion::{

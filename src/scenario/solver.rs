@@ -70,6 +70,8 @@ pub struct SolverSpec {
     pub linear_solver: LinearSolver,
     /// When to stop.
     pub effort: Effort,
+    /// Whether to find out which limits would have to give when no motion is found.
+    pub explain: bool,
     /// Threads that evaluate the derivatives of the NLP; the linear solver uses one.
     #[schemars(range(min = 1, max = 2))]
     pub threads: usize,
@@ -85,6 +87,7 @@ impl Default for SolverSpec {
             hessian_memory: 6,
             linear_solver: LinearSolver::Auto,
             effort: Effort::Smooth,
+            explain: true,
             threads: 1,
         }
     }

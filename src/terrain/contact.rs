@@ -97,6 +97,14 @@ impl ContactGround {
         Self { grid: *grid, needs, heights: heights.to_vec(), planes, steppable, under_foot, has_holes }
     }
 
+    /// Rules out the cells whose place is not allowed.
+    pub fn keep_out(&mut self, allows: impl Fn([f64; 2]) -> bool) {
+        let grid = self.grid;
+        for (cell, steppable) in self.steppable.iter_mut().enumerate() {
+            *steppable &= allows([grid.x(cell % grid.columns), grid.y(cell / grid.columns)]);
+        }
+    }
+
     /// Whether feet keep away from places because nothing was measured there.
     pub fn has_holes(&self) -> bool {
         self.has_holes

@@ -6,6 +6,7 @@
 
 mod analytic;
 mod contact;
+mod detour;
 mod file;
 mod fill;
 mod formats;
@@ -13,6 +14,7 @@ mod formula;
 mod function;
 mod ground;
 mod heightmap;
+mod keep_out;
 mod morphology;
 mod patch;
 mod placing;
@@ -29,9 +31,11 @@ use crate::heightfield::Heightfield;
 use crate::scenario::terrain::{Domain, HeightmapSpec};
 use crate::scenario::{Scenario, TerrainSpec};
 pub use contact::{ContactGround, FootNeeds};
+pub use detour::Bends;
 use formula::Formula;
 pub use ground::{Ground, GroundReport};
 pub use heightmap::{Heightmap, Source};
+pub use keep_out::KeepOut;
 pub use patch::Patch;
 pub use scan::Scan;
 pub use surfaces::Surfaces;

@@ -10,8 +10,10 @@
 use std::sync::Arc;
 
 use super::contact::{ContactGround, FootNeeds};
+use super::detour::{Bends, bends};
 use super::fill::fill_holes;
 use super::ground::Ground;
+use super::keep_out::KeepOut;
 use super::morphology::{averaged, disc, for_each_neighborhood, rolled_over};
 use super::smooth::smooth;
 use crate::error::Result;
@@ -61,12 +63,23 @@ pub struct Surfaces {
     pub knees: Arc<Heightfield>,
     /// Where feet can stand; none if they may stand anywhere.
     pub contact: Option<Arc<ContactGround>>,
+    /// Where no foot may stand because the scenario says so.
+    pub keep_out: Option<KeepOut>,
+    /// Where the way bends around what cannot be walked.
+    pub bends: Arc<Bends>,
 }
 
 impl Surfaces {
     /// One surface for all purposes.
     pub fn one(ground: Arc<Heightfield>) -> Self {
-        Self { posture: ground.clone(), feet: ground.clone(), knees: ground, contact: None }
+        Self {
+            posture: ground.clone(),
+            feet: ground.clone(),
+            knees: ground,
+            contact: None,
+            keep_out: None,
+            bends: Arc::default(),
+        }
     }
 
     /// The surfaces of a scenario.
@@ -74,13 +87,22 @@ impl Surfaces {
     /// # Errors
     /// If no foot can stand anywhere.
     pub fn of(scenario: &Scenario, robot: &Robot, ground: &Ground) -> Result<Self> {
-        match scenario.footholds() {
-            Footholds::Anywhere => Ok(Self::one(Arc::new(ground.field.clone()))),
-            Footholds::Patches => Self::with_edges(&scenario.contact, robot, ground),
-        }
+        let field = &ground.field;
+        let keep_out = KeepOut::of(scenario, field.extent(), robot.size(), robot.foot_radius())?;
+        let surfaces = match scenario.footholds() {
+            Footholds::Anywhere => Self::one(Arc::new(field.clone())),
+            Footholds::Patches => Self::with_edges(&scenario.contact, robot, ground, keep_out.as_ref())?,
+        };
+        let bends = bends(scenario, robot, field, surfaces.contact.as_deref(), keep_out.as_ref());
+        Ok(Self { keep_out, bends: Arc::new(bends), ..surfaces })
     }
 
-    fn with_edges(contact: &ContactSpec, robot: &Robot, ground: &Ground) -> Result<Self> {
+    fn with_edges(
+        contact: &ContactSpec,
+        robot: &Robot,
+        ground: &Ground,
+        keep_out: Option<&KeepOut>,
+    ) -> Result<Self> {
         let grid = ground.field.grid();
         let heights = ground.field.samples();
         let raw = ground.raw.as_deref().unwrap_or(heights);
@@ -103,19 +125,26 @@ impl Surfaces {
         let deviation = POSTURE * robot.standing_height();
         ensure_coarse(grid, deviation.max(needs.beside))?;
         let unknown = ground.unknown.as_deref().filter(|_| contact.on_known_ground);
-        let contact = ContactGround::new(grid, heights, unknown, needs);
+        let mut contact = ContactGround::new(grid, heights, unknown, needs);
         // At the top of an edge, the average lies below what the body itself rolls over.
         let envelope = |radius: f64, least: f64| {
             let averaged = averaged(grid, &rolled_over(grid, raw, radius), ENVELOPE * foot);
             let least = rolled_over(grid, raw, least);
             surface(&averaged.iter().zip(&least).map(|(a, b)| a.max(*b)).collect::<Vec<_>>())
         };
+        // The ground of a kept-out place is as good as any for the posture.
+        let posture = surface(&posture(&contact, heights, deviation)?)?;
+        if let Some(keep_out) = keep_out {
+            contact.keep_out(|place| keep_out.allows(place));
+        }
         let knee = robot.knee_radius();
         Ok(Self {
-            posture: surface(&posture(&contact, heights, deviation)?)?,
+            posture,
             feet: envelope(BALL * foot, LEAST_BALL * foot)?,
             knees: envelope(knee + KNEE_MARGIN * foot, knee + 0.5 * KNEE_MARGIN * foot)?,
             contact: Some(Arc::new(contact)),
+            keep_out: None,
+            bends: Arc::default(),
         })
     }
 

@@ -150,6 +150,7 @@ pub fn standing() -> Plan {
                 linear_solver: "faer".into(),
                 seconds: Seconds { total: 0.3, ..Default::default() },
             },
+            explanation: None,
             checks: Vec::new(),
             inputs: Default::default(),
         },

@@ -9,6 +9,7 @@ from typing import Any
 from .adhesion import adhesion, greatest
 from .arrays import Array
 from .collision import SelfCollision
+from .conditions import Payload, payload_of
 from .controllers import WholeBody, usable
 from .criteria import Metric
 from .metrics import judge_closed_loop, judge_collisions
@@ -19,6 +20,7 @@ from .replay import Incident, Replay
 from .scene import build_world
 from .settings import PHYSICS_RATES, Disturbance
 from .simulation import Simulation
+from .trunk import trunk_forces
 
 
 @dataclass(frozen=True)
@@ -29,21 +31,25 @@ class Robot:
     model: Any  # without contacts
     index: Indices
     adhesive: tuple[str, ...]
+    payload: Payload | None = None
 
 
 def robot_of(plan: Plan, model: str | None) -> Robot:
     """Load `model`, or the full model of the plan's robot."""
     path = model_file(model) if model else find_model(plan.robot.name)
-    own = load_robot(path, plan.robot.gravity)
+    payload = payload_of(plan)
+    own = load_robot(path, plan.robot.gravity, payload)
     adhesive = tuple(f for f, sticks in zip(plan.foot_names, plan.foot_adhesive, strict=True) if sticks)
-    return Robot(path, own, indices(own, plan.foot_names), adhesive)
+    return Robot(path, own, indices(own, plan.foot_names), adhesive, payload)
 
 
 def world_of(plan: Plan, robot: Robot, terrain: Heightfield, disturbance: Disturbance) -> Any:
     """The MuJoCo model of the robot on `terrain`, changed by the disturbance."""
     strength = greatest(plan.pull_limit * plan.weight, plan.weight)
     friction, gravity, start = plan.robot.friction, plan.robot.gravity, plan.foot_position[0].mean(0)
-    return build_world(robot.path, terrain, friction, gravity, robot.adhesive, strength, disturbance, start)
+    return build_world(
+        robot.path, terrain, friction, gravity, robot.adhesive, strength, disturbance, start, payload=robot.payload
+    )
 
 
 @dataclass(frozen=True)
@@ -73,9 +79,12 @@ class ClosedLoop:
         """Replay in `world`, with time steps of 1/`rate` s, and judge as `layer`."""
         plan, robot, reference = self.plan, self.robot, self.reference
         world.opt.timestep = 1 / rate
-        controller = WholeBody(robot.model, robot.index, reference, plan.robot.friction, self._adhesion)
+        applied = trunk_forces(plan, robot.model, reference.t)
+        controller = WholeBody(robot.model, robot.index, reference, plan.robot.friction, self._adhesion, applied=applied)
         index = indices(world, plan.foot_names)
-        simulation = Simulation(world, robot.model, index, reference, controller, self._adhesion, self.start, disturbance)
+        simulation = Simulation(
+            world, robot.model, index, reference, controller, self._adhesion, self.start, disturbance, applied
+        )
         replay = simulation.run()
         metrics, incidents = judge_closed_loop(layer, plan, replay, reference, index)
         if len(replay.t) > 1:

@@ -19,6 +19,7 @@ from .geometry import rotation_vector
 from .model import Indices
 from .observer import Moment, Observer
 from .reference import Reference
+from .trunk import TrunkForces
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
 FRICTION_USED = 0.95  # fraction of the friction that the controller uses; at the edge of the cone a foot slides
@@ -104,11 +105,16 @@ class WholeBody:
         friction: float,
         adhesion: Array,
         gains: Gains | None = None,
+        applied: TrunkForces | None = None,
     ) -> None:
-        """`adhesion` (K, E) N: how strongly each foot sticks, which adds to the normal force in the friction law."""
+        """`adhesion` (K, E) N: how strongly each foot sticks, which adds to the normal force in the friction law.
+
+        `applied` acts on the trunk as planned.
+        """
         self.model, self.index, self.reference, self.gains = model, index, reference, gains or gains_for(index.size)
         self.friction, self.adhesion = usable(friction), adhesion
         self.mass = float(model.body_mass.sum())
+        self._applied = applied
         self.failures = 0
         nv, E = model.nv, len(index.feet)
         self._M = np.zeros((nv, nv))
@@ -143,6 +149,8 @@ class WholeBody:
         self._touch_down.update(k, self.reference.contact[k], touching)
         stance = np.flatnonzero(self.reference.contact[k] | self._touch_down.early)
         weights = np.array(self._base_tasks(k, data, bias) + self._foot_tasks(k, data, touching))
+        if self._applied is not None:
+            bias[:6] -= self._applied.generalized(k, data.xmat[self.index.base].reshape(3, 3))
         H, gradient = self._objective(k, stance, weights)
         C, lower, upper = self._constraints(k, stance, touching, bias - self.observer.generalized)
         sense = np.zeros(len(C), np.int32)

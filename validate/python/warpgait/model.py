@@ -18,11 +18,13 @@ import mujoco
 import numpy as np
 
 from .arrays import Array, Integers
+from .conditions import Payload
 from .errors import InputError
 from .settings import MUJOCO_VERSION
 from .text import is_name
 
 JOINTS = 3  # of a leg
+CARRIED, CARRIED_RADIUS = "carried", 0.01  # the body of a payload, which plans take for a point, and its radius of gyration, m
 ANYMAL_HEIGHT, SIZE_STEP = 0.43, 0.05  # m, of the ANYmals; sizes of robots are multiples of the step
 
 
@@ -116,17 +118,27 @@ def adhesion_name(foot: str) -> str:
     return f"adhesion_{foot}"
 
 
-def load_spec(path: Path) -> Any:
-    """The model as an editable `MjSpec`."""
+def load_spec(path: Path, payload: Payload | None = None) -> Any:
+    """The model as an editable `MjSpec`, with a payload if the robot carries one."""
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
         raise InputError(f"{path}: not a usable MJCF model: {error}") from error
+    if payload is not None:
+        model = mujoco.MjSpec.from_file(str(path)).compile()
+        data = mujoco.MjData(model)
+        stand(model, data)
+        place = composite(model, data).center_of_mass + payload.position
+        inertia = [payload.mass * CARRIED_RADIUS**2] * 3
+        spec.body("base").add_body(
+            name=CARRIED, pos=place, ipos=[0, 0, 0], mass=payload.mass, inertia=inertia, explicitinertial=True
+        )
+    return spec
 
 
-def load_robot(path: Path, gravity: Array) -> Any:
-    """The robot alone, in this gravity (3,) m/s², without contacts."""
-    spec = load_spec(path)
+def load_robot(path: Path, gravity: Array, payload: Payload | None = None) -> Any:
+    """The robot alone, with a payload if it carries one, in this gravity (3,) m/s², without contacts."""
+    spec = load_spec(path, payload)
     spec.option.gravity = gravity
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
     return spec.compile()

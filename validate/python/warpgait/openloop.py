@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .arrays import Array, Bools
+from .conditions import wrench_of
 from .geometry import rotation_from_wxyz, rotations_between
 from .kinematics import legs
 from .model import Indices, stand
@@ -98,7 +99,9 @@ def centroidal_residual(plan: Plan) -> Array:
     p = plan.base_position
     acceleration = (p[2:] - 2 * p[1:-1] + p[:-2]) / step**2
     residual[1:-1, :3] = force.sum(1)[1:-1] + plan.robot.mass * (plan.robot.gravity - acceleration)
-    torque = np.cross(plan.foot_position - p[:, None], force).sum(1)
+    applied = wrench_of(plan)
+    residual[1:-1, :3] += applied[1:-1, :3]
+    torque = np.cross(plan.foot_position - p[:, None], force).sum(1) + applied[:, 3:]
     if plan.angular_momentum is not None:
         change = (plan.angular_momentum[2:] - plan.angular_momentum[:-2]) / (2 * step)
         residual[1:-1, 3:] = (torque[:-2] + 2 * torque[1:-1] + torque[2:]) / 4 - change
@@ -158,6 +161,8 @@ def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: 
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     forces = plan.foot_force * plan.foot_contact[..., None]
     forces[1:-1] = (forces[:-2] + 4 * forces[1:-1] + forces[2:]) / 6
+    applied = wrench_of(plan)
+    applied[1:-1] = (applied[:-2] + 4 * applied[1:-1] + applied[2:]) / 6
     for k in range(1, N - 1):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[k], qvel[k], qacc[k]
         mujoco.mj_inverse(model, data)
@@ -169,7 +174,7 @@ def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: 
         force = generalized[:3]
         arm = com_from_base(data, index)
         moment = data.xmat[index.base].reshape(3, 3) @ generalized[3:6] - np.cross(arm, force)
-        residual[k] = np.r_[force, moment]
+        residual[k] = np.r_[force, moment] - applied[k]
         torque[k] = generalized[index.qvel]
     model.opt.disableflags = flags
     return residual, torque

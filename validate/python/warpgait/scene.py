@@ -11,6 +11,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.spatial.transform import Rotation
 
 from .arrays import Array
+from .conditions import Payload
 from .model import adhesion_name, load_spec
 from .plan import Heightfield
 from .settings import CELL, PHYSICS_RATES, Disturbance
@@ -125,13 +126,14 @@ def world_spec(
     disturbance: Disturbance | None = None,
     pivot: Array | None = None,
     cell: float = CELL,
+    payload: Payload | None = None,
 ) -> Any:
     """Robot and terrain as an editable `MjSpec`. Feet in `adhesive` get an adhesion actuator of strength `adhesion` N.
 
-    `pivot` (3,) m is the point about which the disturbance tilts the ground.
+    `pivot` (3,) m is the point about which the disturbance tilts the ground; `payload` is what the robot carries as planned.
     """
     disturbance = disturbance or Disturbance()
-    spec = load_spec(path)
+    spec = load_spec(path, payload)
     spec.option.timestep = 1 / PHYSICS_RATES[0]
     spec.option.gravity = gravity
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # contacts.py reads the forces as such cones have them

@@ -20,6 +20,7 @@ from .model import Indices, foot_of
 from .reference import Reference
 from .replay import CONTACT_FORCE, Incident, Replay
 from .settings import Disturbance
+from .trunk import TrunkForces
 
 SETTLING_TIME = 0.6  # s: the robot stands at the first sample before the plan's clock starts
 INITIAL_DEPTH = 5e-4  # m: the feet start this deep in the ground, about as deep as the weight presses them, so that all touch
@@ -97,13 +98,15 @@ class Simulation:
         adhesion: Array,
         qpos: Array,
         disturbance: Disturbance | None = None,
+        applied: TrunkForces | None = None,
     ) -> None:
         """The robot starts in `world` in posture `qpos` (nq,). The controller sees `own_model`, which has no contacts.
 
-        `adhesion` (K, E) N: how strongly the feet stick.
+        `adhesion` (K, E) N: how strongly the feet stick. `applied` acts on the trunk as planned.
         """
         self._disturbance = disturbance or Disturbance()
         self._world, self._index, self._reference, self._controller = world, index, reference, controller
+        self._applied = applied
         self._adhesion, self._data = adhesion, mujoco.MjData(world)
         self._data.qpos[:] = qpos
         self._data.qpos[2] -= INITIAL_DEPTH
@@ -145,9 +148,14 @@ class Simulation:
         self._judge_fall(k, max(time, 0.0), sample.com)
 
     def _push(self, time: float) -> None:
-        """Apply the disturbance's force to the base while it lasts."""
-        force, push = self._data.xfrc_applied[self._index.base, :3], self._disturbance.push
-        force[:] = push[2:] if push and push[0] <= time < push[0] + push[1] else 0.0
+        """Apply the force of the disturbance, and those of the plan, to the base while they last."""
+        wrench, push = self._data.xfrc_applied[self._index.base], self._disturbance.push
+        wrench[:] = 0.0
+        if push and push[0] <= time < push[0] + push[1]:
+            wrench[:3] = push[2:]
+        if self._applied is not None:
+            k = max(round(time / self._period), 0)
+            wrench += self._applied.about_center(k, self._data, self._index.base)
 
     def _measure(self) -> Bools:
         """Which feet touch the ground (E,). What the controller sees is in `_measurement`."""

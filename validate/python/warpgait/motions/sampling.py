@@ -18,6 +18,7 @@ from scipy.spatial.transform import Slerp
 from .._native import load
 from ..archive import Archive
 from ..arrays import Array, Bools
+from ..conditions import payload_of
 from ..errors import InputError
 from ..files import stem_of
 from ..geometry import rotation_from_wxyz
@@ -166,7 +167,7 @@ def _motion_of_plan(plan: Plan, rate: float | None) -> Motion:
         path = find_model(plan.robot.name)
     except InputError:
         return _rigid(plan, rate, planned, report)
-    model = load_robot(path, plan.robot.gravity)
+    model = load_robot(path, plan.robot.gravity, payload_of(plan))
     index = indices(model, plan.foot_names)
     found, _ = rolled_postures(plan, model, index)
     if found.unreachable.any():
@@ -200,7 +201,7 @@ def _motion_of_replay(plan: Plan, rate: float | None) -> Motion:
     replay = _Replay(file, plan)
     report = report_of(plan)
     path = find_model(report.robot if report.robot else plan.robot.name)
-    model = load_robot(path, plan.robot.gravity)
+    model = load_robot(path, plan.robot.gravity, payload_of(plan))
     index = indices(model, plan.foot_names)
     rate = _ensure_rate(rate or round(1 / float(replay.t[1] - replay.t[0]), 6))
     t = _frames(float(replay.t[-1]), rate)

@@ -1,0 +1,169 @@
+//! Refuses conditions that contradict themselves, the robot or the way.
+
+use super::format::Scenario;
+use crate::Result;
+use crate::input::{Document, closest};
+use crate::robot::Robot;
+
+/// Refuses ranges of the posture, forces and footholds that no motion can have.
+pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
+    posture(document, scenario)?;
+    if let Some(robot) = robot {
+        heights(document, scenario, robot)?;
+        feet(document, scenario, robot)?;
+    }
+    forces(document, scenario)?;
+    footholds(document, scenario)?;
+    keep_out(document, scenario)
+}
+
+fn posture(document: &Document, scenario: &Scenario) -> Result<()> {
+    let spec = &scenario.posture;
+    for (key, range) in [("height", spec.height), ("roll", spec.roll), ("pitch", spec.pitch)] {
+        if let Some([least, greatest]) = range.filter(|[least, greatest]| least >= greatest) {
+            let what = format!("given [{least}, {greatest}], allowed: [least, greatest], the first smaller");
+            return Err(document.error(&format!("posture.{key}"), what));
+        }
+    }
+    Ok(())
+}
+
+/// The keys that give heights over the feet, with the least and the greatest.
+fn given_heights(scenario: &Scenario) -> Vec<(String, [f64; 2])> {
+    let goal = scenario.goal.height.map(|height| ("goal.height".to_owned(), [height; 2]));
+    let waypoints = scenario.goal.waypoints.iter().enumerate();
+    let waypoints =
+        waypoints.filter_map(|(n, w)| Some((format!("goal.waypoints[{n}].height"), [w.height?; 2])));
+    goal.into_iter().chain(waypoints).collect()
+}
+
+/// Heights must be within the limits of the posture, and within what the legs reach on level ground.
+fn heights(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    let given = given_heights(scenario);
+    if let Some([least, greatest]) = scenario.posture.height {
+        for (key, [height, _]) in &given {
+            if !(least..=greatest).contains(height) {
+                let place = document.place("posture.height");
+                let what = format!("given {height} m, outside [{least}, {greatest}] ({place})");
+                return Err(document.error(key, what));
+            }
+        }
+    }
+    let mean = robot.standing_height();
+    // On level ground, every foot is as far below the center of mass as the height says; stances of unequal legs differ a little.
+    let reach = |sign: f64| {
+        robot.feet.iter().map(move |foot| {
+            let deepest = foot.nominal[2] + mean;
+            deepest - foot.reach.center[2] + sign * foot.reach.half_size[2]
+        })
+    };
+    let [low, high] = [reach(-1.0).fold(0.0, f64::max), reach(1.0).fold(f64::INFINITY, f64::min)];
+    let posture = scenario.posture.height.map(|range| ("posture.height".to_owned(), range));
+    for (key, [least, greatest]) in posture.into_iter().chain(given) {
+        if greatest < low || least > high {
+            let words = if least == greatest { format!("{least}") } else { format!("[{least}, {greatest}]") };
+            let what = format!(
+                "given {words} m, which excludes every stance of {}: its legs carry the center of mass {low:.3} to {high:.3} m above the feet (it stands at {mean:.3} m)",
+                robot.name
+            );
+            return Err(document.error(&key, what));
+        }
+    }
+    Ok(())
+}
+
+fn forces(document: &Document, scenario: &Scenario) -> Result<()> {
+    for (n, force) in scenario.force.iter().enumerate() {
+        if force.until <= force.from {
+            let place = document.place(&format!("force[{n}].from"));
+            let what = format!("given {} s, allowed: after {} s ({place})", force.until, force.from);
+            return Err(document.error(&format!("force[{n}].until"), what));
+        }
+        if force.from >= scenario.horizon {
+            let place = document.place("horizon");
+            let what = format!(
+                "given {} s, allowed: before the end at {} s ({place})",
+                force.from, scenario.horizon
+            );
+            return Err(document.error(&format!("force[{n}].from"), what));
+        }
+    }
+    Ok(())
+}
+
+/// The feet of footholds are the robot's.
+fn feet(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    let names = robot.foot_names();
+    for (n, spec) in scenario.foothold.iter().enumerate() {
+        if !names.contains(&spec.foot.as_str()) {
+            let guess = closest(&spec.foot, &names)
+                .map_or(String::new(), |name| format!("did you mean \"{name}\"? "));
+            let what = format!(
+                "given \"{}\"; {guess}allowed: the feet of {}: {}",
+                spec.foot,
+                robot.name,
+                names.join(", ")
+            );
+            return Err(document.error(&format!("foothold[{n}].foot"), what));
+        }
+    }
+    Ok(())
+}
+
+/// Polygons have an area, and neither the ends of the way nor what must be stepped on is inside of them.
+fn keep_out(document: &Document, scenario: &Scenario) -> Result<()> {
+    for (n, spec) in scenario.keep_out.iter().enumerate() {
+        let key = format!("keep_out[{n}].polygon");
+        if spec.doubled_area() < 1e-6 {
+            let what =
+                "its corners are on a line, or its parts cancel; allowed: corners in order around an area";
+            return Err(document.error(&key, what));
+        }
+        let footholds = scenario.foothold.iter().enumerate();
+        if let Some((m, fixed)) = footholds.clone().find(|(_, fixed)| spec.distance(fixed.position) < 0.0) {
+            let [x, y] = fixed.position;
+            let what = format!("given [{x}, {y}], which is kept free of feet ({})", document.place(&key));
+            return Err(document.error(&format!("foothold[{m}].position"), what));
+        }
+    }
+    Ok(())
+}
+
+fn footholds(document: &Document, scenario: &Scenario) -> Result<()> {
+    for (n, spec) in scenario.foothold.iter().enumerate() {
+        let key = |last: &str| format!("foothold[{n}].{last}");
+        if spec.step.is_some() == spec.time.is_some() {
+            let what = "give the number of a step or a time, and not both";
+            return Err(document.error(&key(if spec.step.is_some() { "time" } else { "step" }), what));
+        }
+        if let Some(time) = spec.time.filter(|time| *time > scenario.horizon) {
+            let place = document.place("horizon");
+            let what =
+                format!("given {time} s, allowed: at most the horizon of {} s ({place})", scenario.horizon);
+            return Err(document.error(&key("time"), what));
+        }
+        if let Some([x_min, x_max, y_min, y_max]) = scenario.terrain.extent() {
+            let [x, y] = spec.position;
+            if !((x_min..=x_max).contains(&x) && (y_min..=y_max).contains(&y)) {
+                let place = document.place("terrain.extent");
+                let what = format!(
+                    "given [{x}, {y}], outside the terrain ({place}); allowed: x from {x_min} to {x_max}, y from {y_min} to {y_max} m"
+                );
+                return Err(document.error(&key("position"), what));
+            }
+        }
+        let same = |other: &&super::FootholdSpec| {
+            other.foot == spec.foot && other.step.is_some() && other.step == spec.step
+        };
+        if let Some(m) = scenario.foothold[..n].iter().position(|other| same(&other)) {
+            let place = document.place(&format!("foothold[{m}].step"));
+            let what = format!(
+                "given {} for {}, which already has a place ({place})",
+                spec.step.unwrap_or(0),
+                spec.foot
+            );
+            return Err(document.error(&key("step"), what));
+        }
+    }
+    Ok(())
+}
