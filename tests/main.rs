@@ -8,6 +8,7 @@ mod check;
 mod claims;
 mod cli;
 mod common;
+mod conditions;
 mod derivatives;
 mod durations;
 mod edges;

@@ -25,11 +25,11 @@ use crate::scenario::{Effort, Hessian, Scenario, SolverSpec};
 /// Rows of a block and a foot that act within this time share a slack, s.
 const WINDOW: f64 = 0.25;
 /// ε.
-const COST: f64 = 1e-3;
+const COST: f64 = 0.03;
 /// Iterations, at most.
 const ITERATIONS: usize = 100;
 /// Limits that give less than this fraction of c are not named.
-const LEAST: f64 = 0.02;
+const LEAST: f64 = 0.03;
 
 /// A limit that would have to give.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,23 +87,23 @@ macro_rules! kinds {
     };
 }
 
-/// The blocks that can give. All others are laws.
+/// The blocks that can give; all others are laws. What the user can change gives more easily than what the robot is.
 const KINDS: &[Kind] = kinds! {
-    "reach", 0.05, true, 1e3, "mm", "FOOT's reach box is ", " too small";
+    "reach", 0.03, true, 1e3, "mm", "FOOT's reach box is ", " too small";
     "friction", 0.1, false, 1e2, "% of the weight", "FOOT lacks friction for ", "";
     "friction (Eq. 9)", 0.1, false, 1e2, "% of the weight", "FOOT lacks friction for ", "";
-    "normal force", 0.2, false, 1e2, "% of the weight", "FOOT's normal force is ", " beyond its limits";
-    "swing clearance", 0.03, true, 1e3, "mm", "FOOT swings ", " too low";
-    "base clearance", 0.05, true, 1e3, "mm", "the torso is ", " too close to the ground";
-    "goal", 0.1, true, 1e3, "mm", "the base ends ", " from the goal";
-    "way-points", 0.1, true, 1e3, "mm", "the base passes a way-point ", " too far away";
+    "normal force", 0.4, false, 1e2, "% of the weight", "FOOT's normal force is ", " beyond its limits";
+    "swing clearance", 0.1, true, 1e3, "mm", "FOOT swings ", " too low";
+    "base clearance", 0.1, true, 1e3, "mm", "the torso is ", " too close to the ground";
+    "goal", 0.2, true, 1e3, "mm", "the base ends ", " from the goal";
+    "way-points", 0.2, true, 1e3, "mm", "the base passes a way-point ", " too far away";
     "foothold patch", 0.05, true, 1e3, "mm", "FOOT's foothold is ", " outside its patch";
     "foothold slope", 0.2, false, 1e2, "%", "FOOT's foothold is ", " too steep";
-    "fixed footholds", 0.05, true, 1e3, "mm", "FOOT's foothold is ", " from the given place";
+    "fixed footholds", 0.1, true, 1e3, "mm", "FOOT's foothold is ", " from the given place";
     "keep out", 0.05, true, 1e3, "mm", "FOOT stands ", " too deep in what is kept free";
-    "posture", 0.05, true, 1e3, "mm or mrad", "the torso is ", " beyond [posture]";
-    "joint speed", 0.3, false, 1e2, "% of its limit", "a joint of FOOT is ", " too slow";
-    "joint torque", 0.3, false, 1e2, "% of its limit", "a joint of FOOT is ", " too weak";
+    "posture", 0.1, true, 1e3, "mm or mrad", "the torso is ", " beyond [posture]";
+    "joint speed", 0.2, false, 1e2, "% of its limit", "a joint of FOOT is ", " too slow";
+    "joint torque", 0.2, false, 1e2, "% of its limit", "a joint of FOOT is ", " too weak";
     "knee clearance", 0.03, true, 1e3, "mm", "FOOT's knee or shank is ", " too close to the ground";
 };
 
@@ -404,7 +404,7 @@ pub(super) fn remedy(scenario: &Scenario, shortfalls: &[Shortfall]) -> Option<(&
     match block.as_str() {
         "swing clearance" => Some((
             "motion.swing_clearance",
-            lower(motion.swing_clearance, 2e-3 * most),
+            lower(motion.swing_clearance, 1e-3 * most),
             motion.swing_clearance,
         )),
         "base clearance" => {

@@ -35,8 +35,8 @@ const PLAIN_FRACTION: f64 = 0.5;
 const LEG_ROUNDS: usize = 6;
 /// By how much the torque that it adds may still change, rms and at most, m g · 1 m.
 const LEG_TOLERANCE: [f64; 2] = [0.0015 * LEVER, 0.005 * LEVER];
-/// Looking for a reason takes as long as the solve at most, or this long if that is more, s.
-const LEAST_SECONDS: u64 = 10;
+/// Looking for a reason takes twice as long as the solve at most, or this long if that is more, s.
+const LEAST_SECONDS: u64 = 30;
 /// m, with which torques are compared with the weight.
 const LEVER: f64 = 0.3;
 
@@ -433,9 +433,15 @@ impl<'a> Solve<'a> {
         if !solver.explain || end.feasible || end.interrupted || self.interrupted {
             return None;
         }
-        let limit = self.start.elapsed().max(Duration::from_secs(LEAST_SECONDS));
+        // The whole problem with second derivatives, whatever the stage was, from the guess: a solve that failed can end anywhere.
+        let mut model = self.task.model().ok()?;
+        let x = self.guess(&model).ok()?;
+        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
+        let choice = Choice { with_costs: true, exact_hessian: true };
+        let mut problem = GaitProblem::new(self.task.scenario, model, x.clone(), choice);
+        let limit = (2 * self.start.elapsed()).max(Duration::from_secs(LEAST_SECONDS));
         let (host, before, mut stopped) = (&mut *self.host, self.iterations, false);
-        let shortfalls = elastic::shortfalls(&mut end.problem, &end.x, solver, limit, &mut |record| {
+        let shortfalls = elastic::shortfalls(&mut problem, &x, solver, limit, &mut |record| {
             let iteration = before + record.iteration;
             let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record });
             stopped = flow.is_break();

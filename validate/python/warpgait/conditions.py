@@ -83,7 +83,7 @@ def wrench_of(plan: Plan) -> Array:
     """Force, N, and torque about the center of mass, N m, of the forces on the trunk at the samples of a plan, (N, 6), world frame."""
     wrench = np.zeros((len(plan.t), 6))
     for applied in forces_of(plan):
-        force, point = applied.at(plan.t), np.broadcast_to(applied.point, (len(plan.t), 3))
+        force, point = applied.at(plan.t), np.tile(applied.point, (len(plan.t), 1))
         if plan.center_of_mass_shift is not None:
             point = point - plan.center_of_mass_shift
         wrench[:, :3] += force

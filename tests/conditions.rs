@@ -1,0 +1,112 @@
+//! Conditions of a motion: what contradicts itself is refused, a payload makes another robot, and what no motion can do is explained.
+
+use crate::common::solved;
+use warpgait::check::check;
+use warpgait::robot::{Robot, RobotSpec};
+use warpgait::scenario::load_text;
+
+const FLAT: &str = "horizon = 5.0\n[robot]\nname = \"anymal_c\"\n[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
+    [start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.5, 0.0]\n";
+
+fn refusal(conditions: &str) -> String {
+    load_text("s.toml", &format!("{FLAT}{conditions}"), ".".as_ref(), &[]).expect_err(conditions).to_string()
+}
+
+#[test]
+fn contradictions_are_refused_with_both_lines() {
+    let foothold = "[[foothold]]\nfoot = \"LF\"\nstep = 1\nposition = [0.5, 0.3]\n";
+    let kept = "[[keep_out]]\npolygon = [[0.4, 0.2], [0.6, 0.2], [0.6, 0.4], [0.4, 0.4]]\n";
+    for (conditions, expected) in [
+        (
+            format!("{foothold}{kept}"),
+            "s.toml:14: foothold[0].position: given [0.5, 0.3], which is kept free of feet (keep_out[0].polygon, line 16)",
+        ),
+        (
+            format!("{foothold}{foothold}"),
+            "s.toml:17: foothold[1].step: given 1 for LF, which already has a place (foothold[0].step, line 13)",
+        ),
+        (
+            foothold.replace("LF", "FL"),
+            "s.toml:12: foothold[0].foot: given \"FL\"; allowed: the feet of anymal_c: LF, RF, LH, RH",
+        ),
+        (
+            foothold.replace("step = 1", "time = 9.0"),
+            "s.toml:13: foothold[0].time: given 9 s, allowed: at most the horizon of 5 s (horizon, line 1)",
+        ),
+        (
+            foothold.replace("step = 1\n", ""),
+            "s.toml:11: foothold[0].step: give the number of a step or a time, and not both",
+        ),
+        (
+            foothold.replace("0.3]", "3.0]"),
+            "s.toml:14: foothold[0].position: given [0.5, 3], outside the terrain (terrain.extent, line 6)",
+        ),
+        (
+            "[posture]\nroll = [0.2, -0.2]\n".into(),
+            "s.toml:12: posture.roll: given [0.2, -0.2], allowed: [least, greatest], the first smaller",
+        ),
+        (
+            "[posture]\nheight = [0.9, 1.0]\n".into(),
+            "s.toml:12: posture.height: given [0.9, 1] m, which excludes every stance of anymal_c: its legs carry",
+        ),
+        (
+            "[[force]]\nvector = [1.0, 0.0, 0.0]\nfrom = 2.0\nuntil = 1.0\n".into(),
+            "s.toml:14: force[0].until: given 1 s, allowed: after 2 s (force[0].from, line 13)",
+        ),
+        (
+            "[[keep_out]]\npolygon = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]\n".into(),
+            "s.toml:12: keep_out[0].polygon: its corners are on a line",
+        ),
+    ] {
+        let message = refusal(&conditions);
+        assert!(message.starts_with(expected), "{message}\nis not\n{expected}");
+    }
+    let higher = FLAT.replace("[goal]", "[posture]\nheight = [0.4, 0.5]\n[goal]\nheight = 0.55");
+    let message = load_text("s.toml", &higher, ".".as_ref(), &[]).unwrap_err().to_string();
+    let expected = "s.toml:12: goal.height: given 0.55 m, outside [0.4, 0.5] (posture.height, line 10)";
+    assert!(message.starts_with(expected), "{message}");
+}
+
+#[test]
+fn a_payload_moves_the_center_of_mass_and_keeps_the_size() {
+    let spec = RobotSpec { name: "anymal_c".into(), ..Default::default() };
+    let bare = Robot::load(&spec, ".".as_ref()).unwrap();
+    let loaded = bare.clone().with_payload(10.0, [0.2, 0.0, 0.3]).unwrap();
+    let moved = 10.0 / (bare.mass + 10.0);
+    assert!((loaded.mass - bare.mass - 10.0).abs() < 1e-12);
+    assert!((bare.feet[0].nominal[0] - loaded.feet[0].nominal[0] - 0.2 * moved).abs() < 1e-12);
+    assert!((loaded.standing_height() - bare.standing_height() - 0.3 * moved).abs() < 1e-9);
+    assert_eq!(loaded.size(), bare.size());
+    // The parallel axis theorem for two bodies: the reduced mass times the square of their distance.
+    let reduced = bare.mass * moved;
+    assert!((loaded.inertia[1][1] - bare.inertia[1][1] - reduced * (0.04 + 0.09)).abs() < 1e-9);
+    // The trunk carries it.
+    let trunk = |robot: &Robot| robot.body().expect("links").trunk.mass;
+    assert!((trunk(&loaded) - trunk(&bare) - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_no_motion_can_do_is_explained_and_stays_unsolved() {
+    let text = |explain: bool| {
+        format!(
+            "formulation = \"direct\"\nhorizon = 3.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
+             [start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.2, 0.0]\n[motion]\nbase_clearance = 0.4\n[contact]\nfriction_margin = 0.0\n\
+             [solver]\nmax_iterations = 60\nexplain = {explain}\n"
+        )
+    };
+    let (motion, plan) = solved(&text(true));
+    assert!(!motion.solved && !check(&plan).unwrap().passed);
+    let why = plan.meta.explanation.as_ref().expect("an explanation");
+    assert!(why.shortfalls.iter().any(|s| s.block == "base clearance" && s.amount > 70.0), "{why:?}");
+    assert!(
+        why.shortfalls.iter().all(|s| s.words.contains(&s.unit) && (0.0..=3.0).contains(&s.time[0])),
+        "{why:?}"
+    );
+    assert!(!why.shortfalls.iter().any(|s| s.block == "dynamics"));
+    let [key, to, from] = why.remedy.as_ref().expect("a remedy");
+    assert_eq!((key.as_str(), from.as_str()), ("motion.base_clearance", "0.4"));
+    let less = text(false).replace("base_clearance = 0.4", &format!("base_clearance = {to}"));
+    assert!(solved(&less).0.solved, "{to}");
+    let (motion, plan) = solved(&text(false));
+    assert!(!motion.solved && plan.meta.explanation.is_none());
+}
