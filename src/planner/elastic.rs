@@ -28,6 +28,8 @@ const WINDOW: f64 = 0.25;
 const COST: f64 = 0.03;
 /// Iterations, at most.
 const ITERATIONS: usize = 100;
+/// Limits that are named in sentences, at most.
+const MOST_WORDS: usize = 5;
 /// Limits that give less than this fraction of c are not named.
 const LEAST: f64 = 0.03;
 
@@ -55,6 +57,8 @@ pub struct Shortfall {
 pub struct Explanation {
     /// The limits that would have to give, the worst first.
     pub shortfalls: Vec<Shortfall>,
+    /// Whether the search for the fewest came to its end in time.
+    pub fewest: bool,
     /// A key with which a motion is found, its value, and the value in the scenario, as text.
     pub remedy: Option<[String; 3]>,
 }
@@ -62,7 +66,14 @@ pub struct Explanation {
 impl Explanation {
     /// In a few sentences.
     pub fn sentences(&self) -> String {
-        let words: Vec<&str> = self.shortfalls.iter().map(|s| s.words.as_str()).collect();
+        let mut words: Vec<String> = self.shortfalls.iter().map(|s| s.words.clone()).collect();
+        if words.len() > MOST_WORDS {
+            let more = words.split_off(MOST_WORDS).len();
+            words.push(format!("and {more} more"));
+        }
+        if !self.fewest {
+            words.push("fewer may do, the search ended early".into());
+        }
         let remedy = self.remedy.as_ref().map_or(String::new(), |[key, to, from]| {
             format!("; with {key} = {to} instead of {from} a motion is found")
         });
@@ -302,14 +313,14 @@ impl NlpProblem for Elastic<'_> {
     }
 }
 
-/// The limits that would have to give for there to be a motion near x; none if none was found within the time, or it was interrupted.
-pub(super) fn shortfalls(
+/// The limits that would have to give for there to be a motion; from x. None if none was found within the time, or it was interrupted.
+pub(super) fn explain(
     problem: &mut GaitProblem,
     x: &[f64],
     solver: &SolverSpec,
     limit: Duration,
     on_iteration: &mut dyn FnMut(&IterationRecord) -> ControlFlow<()>,
-) -> Option<Vec<Shortfall>> {
+) -> Option<Explanation> {
     problem.hessian_structure()?;
     let n = problem.num_variables();
     let mut elastic = Elastic::new(problem, x);
@@ -332,9 +343,10 @@ pub(super) fn shortfalls(
         return None;
     }
     // The best point at which the laws hold, if there was one.
-    let unknown = rule.best(Vec::new(), f64::INFINITY, false);
-    let x = if unknown.is_empty() { return None } else { unknown };
-    Some(exceeded(problem, &x[..n]))
+    let fewest = rule.is_satisfied() || solution.status == ipopt::Status::Solved;
+    let best = rule.best(Vec::new(), f64::INFINITY, false);
+    let shortfalls = exceeded(problem, best.get(..n)?);
+    (!shortfalls.is_empty()).then_some(Explanation { shortfalls, fewest, remedy: None })
 }
 
 /// What exceeds its limits at x, runs of a block and a foot together; the worst first.

@@ -441,15 +441,14 @@ impl<'a> Solve<'a> {
         let mut problem = GaitProblem::new(self.task.scenario, model, x.clone(), choice);
         let limit = (2 * self.start.elapsed()).max(Duration::from_secs(LEAST_SECONDS));
         let (host, before, mut stopped) = (&mut *self.host, self.iterations, false);
-        let shortfalls = elastic::shortfalls(&mut problem, &x, solver, limit, &mut |record| {
+        let explanation = elastic::explain(&mut problem, &x, solver, limit, &mut |record| {
             let iteration = before + record.iteration;
             let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record });
             stopped = flow.is_break();
             flow
         });
         end.interrupted |= stopped || INTERRUPT.is_raised();
-        let shortfalls = shortfalls.filter(|shortfalls| !shortfalls.is_empty())?;
-        Some(Explanation { shortfalls, remedy: None })
+        explanation
     }
 
     fn finish(mut self, mut end: StageEnd, explanation: Option<Explanation>) -> Motion {

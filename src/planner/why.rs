@@ -1,6 +1,6 @@
 //! A solve that says why, when no motion is found: which limits would have to give, and whether one key of the scenario would do.
 
-use super::elastic::{Explanation, remedy};
+use super::elastic::remedy;
 use super::motion::Motion;
 use super::solve::{Host, Task, attempt};
 use crate::Result;
@@ -12,11 +12,8 @@ use crate::scenario::{Effort, Scenario};
 /// Those of [`attempt`].
 pub(super) fn attempt_or_explain(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let mut motion = attempt(task, host)?;
-    let Some(shortfalls) = motion.explanation.take().map(|explanation| explanation.shortfalls) else {
-        return Ok(motion);
-    };
-    let mut found = None;
-    if let Some((key, to, from)) = remedy(task.scenario, &shortfalls) {
+    let Some(mut explanation) = motion.explanation.take() else { return Ok(motion) };
+    if let Some((key, to, from)) = remedy(task.scenario, &explanation.shortfalls) {
         let mut scenario: Scenario = task.scenario.clone();
         match key {
             "motion.swing_clearance" => scenario.motion.swing_clearance = to,
@@ -27,8 +24,8 @@ pub(super) fn attempt_or_explain(task: &Task, host: &mut dyn Host) -> Result<Mot
         scenario.solver.explain = false;
         let other = attempt(&Task { scenario: &scenario, ..*task }, host)?;
         motion.interrupted |= other.interrupted;
-        found = other.solved.then(|| [key.to_owned(), to.to_string(), from.to_string()]);
+        explanation.remedy = other.solved.then(|| [key.to_owned(), to.to_string(), from.to_string()]);
     }
-    motion.explanation = Some(Explanation { shortfalls, remedy: found });
+    motion.explanation = Some(explanation);
     Ok(motion)
 }
