@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sphinx.cmd.build import main as sphinx
-
 from warpgait.schema import Schema, constants, entry, resolved, schema, variants
 
 SITE = Path("docs/site")
