@@ -384,3 +384,13 @@ fn the_check_is_not_blind() {
     let wrong = derivatives::check_with(&mut problem, &x, &all, |_| {}, tamper);
     assert!(wrong.iter().all(|e| (e.largest > TOLERANCE) == (e.block == "hessian")));
 }
+
+#[test]
+fn a_start_in_motion_has_true_derivatives() {
+    let start = "[start.state]\nvelocity = [0.3, 0.1, -0.05]\nangular_velocity = [0.1, -0.2, 0.3]\n\
+                 acceleration = [0.5, -0.4, 1.0]\nangular_acceleration = [1.0, 0.5, -0.7]\n";
+    for formulation in ["direct", "hybrid"] {
+        let (name, terrain) = TERRAINS[0];
+        check(problem(terrain, formulation, start), &format!("{name} {formulation} moving"));
+    }
+}

@@ -12,6 +12,7 @@ mod conditions;
 mod derivatives;
 mod durations;
 mod edges;
+mod ends;
 mod exact;
 mod gaits;
 mod measured_ground;

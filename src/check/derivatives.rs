@@ -19,21 +19,18 @@
 use super::laws;
 use super::splines::swing_knots;
 use super::subject::{Finding, Subject, Worst, larger, rms};
-use super::vector::{add, dot, norm, rotation_between, scale, sub};
+use super::vector::{add, norm, rotation_between, scale, sub};
 use crate::Result;
 
 /// Knots of a swing this near to a sample, s, are at it.
 const AT_SAMPLE: f64 = 1e-9;
 /// A velocity error counts as an error of acceleration over this time, s, so that one figure covers both.
 const TIME: f64 = 0.1;
-/// Lever arm by which rotations are compared with motions, m.
-const LEVER: f64 = 0.3;
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     base(s, findings);
     feet(s, findings)?;
     quaternions(s, findings);
-    rest(s, findings);
     Ok(())
 }
 
@@ -171,26 +168,4 @@ fn quaternions(s: &Subject, findings: &mut Vec<Finding>) {
         }
     }
     findings.push((laws::QUATERNION, worst));
-}
-
-/// Velocity, and acceleration over a tenth of a second, at the first and the last sample.
-fn rest(s: &Subject, findings: &mut Vec<Finding>) {
-    let plan = s.plan;
-    let mut worst = Worst::default();
-    for n in [0, s.samples - 1] {
-        let squares = |values: &[[f64; 3]]| dot(values[n], values[n]);
-        for (values, factor) in [
-            (&plan.base_linear_velocity, 1.0),
-            (&plan.base_linear_acceleration, TIME),
-            (&plan.base_angular_velocity, LEVER),
-            (&plan.base_angular_acceleration, LEVER * TIME),
-        ] {
-            worst.meet(factor * squares(values).sqrt(), n, None);
-        }
-        for e in (0..s.feet).filter(|&e| !s.in_contact(n, e)) {
-            // A foot in the air at the beginning or the end is not at rest, whatever its velocity.
-            worst.meet(1.0, n, Some(e));
-        }
-    }
-    findings.push((laws::REST, worst));
 }

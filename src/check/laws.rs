@@ -106,6 +106,9 @@ laws! {
     GROUND_MOVED = "ground_moved", "mm", Some(15.0), None,
         "how far smoothing moved the ground under a foothold, which may be anywhere";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
+    START_STATE = "start_state", "mm", Some(1.0), None, "distance of the base's height and of the feet from start.state at the beginning";
+    START_TURN = "start_turn", "rad", Some(1e-3), None, "difference of the orientation from start.state.tilt and the heading at the beginning";
+    START_FORCE = "start_force", "% m g", Some(0.5), None, "difference of the forces from start.state.forces at the beginning";
     START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the first way-point or the goal, at the beginning";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
     GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given, and from goal.turns on the way there";

@@ -8,6 +8,7 @@ mod claims;
 mod contact;
 mod derivatives;
 mod dynamics;
+mod ends;
 mod ground;
 mod laws;
 mod legs;
@@ -63,6 +64,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     splines::findings(&subject, &mut findings)?;
     terrain::findings(&subject, &mut findings)?;
     derivatives::findings(&subject, &mut findings)?;
+    ends::findings(&subject, &mut findings);
     dynamics::findings(&subject, &mut findings, &mut residuals);
     contact::findings(&subject, &mut findings, &mut residuals);
     patches::findings(&subject, &mut findings);

@@ -45,7 +45,10 @@ fn ends(s: &Subject, findings: &mut Vec<Finding>) {
     let axis = |axis: [f64; 3]| rotate(s.plan.base_quaternion_wxyz[0], axis);
     let toward = [yaw.cos(), yaw.sin(), 0.0];
     let [forward, left] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|a| dot(axis(a), toward));
-    findings.push((laws::START_YAW, at(left.atan2(forward).abs(), 0)));
+    // With a given tilt, the whole orientation is a law of its own.
+    if scenario.start.state.as_ref().is_none_or(|state| state.tilt.is_none()) {
+        findings.push((laws::START_YAW, at(left.atan2(forward).abs(), 0)));
+    }
     if let Some(yaw) = scenario.goal_yaw() {
         let mut off = size(heading(s, last) - yaw);
         if let (Some(_), Some(turn)) = (scenario.goal.turns, scenario.turn()) {

@@ -14,7 +14,8 @@
 //! The centered second difference is p̈ averaged with the hat function over [t₋, t₊]. Averaging the forces in the same way
 //! makes each row the integral of the law against that hat. Forces are linear between samples, and p̈ nearly so. A residual
 //! that is linear between samples, whose hat averages are zero and which vanishes at both ends of the motion, vanishes
-//! everywhere. At the first and the last sample the robot rests, and the row is the balance of forces there.
+//! everywhere. At the first and the last sample the row is the law itself: the robot rests or moves steadily there, or its accelerations are
+//! given ([`crate::nlp::Start`]).
 //!
 //! Forces on the trunk (`[[force]]`) are known functions of time, linear between samples, and act at points R(t) (r − s) from the center of
 //! mass; they are added to those of the feet.
@@ -152,6 +153,10 @@ impl Constraint for Dynamics {
             }
             for &(j, c) in &stencil.position {
                 force -= state.base[j].position() * (c * acceleration);
+            }
+            if let Some(start) = model.start.as_ref().filter(|_| k == 0) {
+                force -= start.rates[0];
+                torque -= start.rates[1];
             }
             if !stencil.turn.is_empty() {
                 let n = self.turned(model, state, k) * state.base[k].rotation().transpose();

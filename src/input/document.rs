@@ -118,6 +118,13 @@ impl Document {
         Ok(())
     }
 
+    /// Takes away a value of a table, by a key of two parts.
+    pub fn remove(&mut self, table: &str, key: &str) {
+        if let Some(Value::Table(inner)) = self.table.get_mut(table) {
+            inner.remove(key);
+        }
+    }
+
     /// Its name in messages.
     pub fn file(&self) -> &str {
         &self.file

@@ -12,6 +12,7 @@
 //! | --- | --- |
 //! | [`model`] | what stays the same during a solve |
 //! | [`leg_terms`] | part of it: what the legs' own mass adds |
+//! | [`start`] | part of it: a given state at the start |
 //! | [`state`] | the ambient nodes at the present x |
 //! | [`term`] | what a constraint and a cost have to provide |
 //! | [`sink`] | where they put their derivatives |
@@ -27,11 +28,13 @@ pub mod leg_terms;
 pub mod local_forms;
 pub mod model;
 pub mod sink;
+pub mod start;
 pub mod state;
 pub mod tangent;
 pub mod term;
 
 pub use leg_terms::LegTerms;
 pub use model::Model;
+pub use start::Start;
 pub use state::State;
 pub use term::{Constraint, Cost};

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::leg_terms::LegTerms;
+use super::start::Start;
 use crate::leg::Leg;
 use crate::leg::body::Body;
 use crate::robot::{Box3, Foot, Robot};
@@ -117,6 +118,10 @@ pub struct Model {
     pub fixed: Vec<FixedFoothold>,
     /// By sample, forces on the trunk, world frame, m g, and where they act, base frame as in `nominal`, m. Empty where there are none.
     pub applied: Vec<Vec<[Vector3<f64>; 2]>>,
+    /// What is given of the state at the start, beside the place and the heading.
+    pub start: Option<Start>,
+    /// Of the base at the end, m/s; none at rest.
+    pub goal_velocity: Option<Vector3<f64>>,
     /// The spaces of the variables.
     pub spaces: Spaces,
     /// The variables.
@@ -161,6 +166,8 @@ impl Model {
             underside,
             surfaces,
             patches: Vec::new(),
+            start: None,
+            goal_velocity: None,
             visits: Vec::new(),
             fixed: fixed_footholds(scenario, robot, gait).into_iter().flatten().collect(),
             applied: applied(scenario, robot.mass, gait.intervals),
@@ -174,6 +181,7 @@ impl Model {
                     force: scenario.discretization.force_knots,
                 },
                 swing_shape,
+                [scenario.start.moves(), scenario.goal.velocity.is_some()],
             ),
         }
     }

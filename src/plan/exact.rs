@@ -118,15 +118,19 @@ impl Plan {
             return Err(Error::input("member phase_durations: needs one row for each of foot_names"));
         }
         let gait = Gait { intervals, swings };
-        let layout = Layout::with_base_intervals(&gait, time_step, base_intervals, 1, self.swing_shape()?);
+        // An end at rest has three control points that coincide.
+        let points = base.as_chunks::<6>().0;
+        let moves = [0, base_intervals].map(|n| points[n] != points[n + 1] || points[n + 1] != points[n + 2]);
+        let ends = (self.swing_shape()?, moves);
+        let layout = Layout::with_base_intervals(&gait, time_step, base_intervals, 1, ends);
         let mut x = vec![0.0; layout.variables];
-        for (i, point) in base.as_chunks::<6>().0.iter().enumerate() {
-            x[layout.base_block(i)..][..6].copy_from_slice(point);
-        }
-        // The first three control points are one variable, and so are the last three.
-        if let Some(i) = (0..points).find(|&i| x[layout.base_block(i)..][..6] != base[6 * i..6 * i + 6]) {
-            let what =
-                format!("control point {i} differs from its neighbor; the motion must start and end at rest");
+        layout.base_spline.set(points, &mut x);
+        let off = |i: usize| {
+            let found = layout.base_spline.point(i).value::<6>(&x);
+            (0..6).any(|d| (found[d] - points[i][d]).abs() > 1e-9 * (1.0 + points[i][d].abs()))
+        };
+        if let Some(i) = (0..points.len()).find(|&i| off(i)) {
+            let what = format!("control point {i} leaves an acceleration at the end, which must have none");
             return Err(wrong("base_control_points", what));
         }
         for foot in 0..self.foot_names.len() {

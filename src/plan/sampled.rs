@@ -220,10 +220,11 @@ fn splines(motion: &Motion) -> Vec<(String, Vec<usize>, Vec<f64>)> {
     let layout = &model.layout;
     let (step, intervals) = (layout.time_step, layout.intervals);
     let unit = model.mass * GRAVITY;
-    let points = layout.base_intervals + 3;
-    let base = (0..points).flat_map(|i| x[layout.base_block(i)..][..6].to_vec()).collect();
+    let spline = &layout.base_spline;
+    let points = spline.points();
+    let base = (0..points).flat_map(|i| spline.point(i).value::<6>(x)).collect();
     // Uniform knots: control point i has the support [t_i, t_{i+4}], t_3 = 0.
-    let knots = (0..points + 4).map(|i| (i as f64 - 3.0) * layout.base_knot_spacing()).collect();
+    let knots = (0..points + 4).map(|i| (i as f64 - 3.0) * spline.spacing).collect();
     let mut splines = vec![
         ("base_control_points".to_string(), vec![points, 6], base),
         ("base_knots".to_string(), vec![points + 4], knots),

@@ -6,6 +6,7 @@ use nalgebra::{Vector2, Vector3};
 use super::pace::{Pace, interpolated};
 use super::retiming::{Corridor, retimed};
 use super::standing::{Pose, allowed, ensure_reach, pulled_back, standing_pose};
+use super::start;
 use super::way::{Place, Way};
 use crate::Result;
 use crate::nlp::Model;
@@ -87,7 +88,7 @@ impl<'a> BasePath<'a> {
         };
         let in_variables = |place: Place| pulled_back(&model.spaces.base, &standing(place, None));
         let [start, goal] = [way.at(0.0), way.at(way.length)];
-        let pose = standing(start, None);
+        let pose = start::pose(scenario, standing(start, None));
         ensure_reach(model, &pose, scenario.start.position)?;
         let first = pulled_back(&model.spaces.base, &pose)?;
         let unwound = |mut y: [f64; 6], heading: f64| {

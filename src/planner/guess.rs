@@ -29,21 +29,43 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
     let footholds = set_footholds(&path, model, &mut x)?;
     set_swings(SWING_APEX * scenario.motion.swing_clearance, &footholds, model, &mut x)?;
     set_forces(&footholds, model, &mut x);
+    set_given(model, &mut x);
     Ok(x)
 }
 
 fn set_base(path: &BasePath, model: &Model, x: &mut [f64]) {
     let layout = &model.layout;
-    for block in 0..layout.base_blocks {
+    let spline = &layout.base_spline;
+    for block in 0..spline.blocks() {
         // Block b is control point b + 2, whose Greville abscissa is knot b + 1; the outer ones are at rest.
         let t = match block {
             0 => 0.0,
-            b if b + 1 == layout.base_blocks => layout.intervals as f64 * layout.time_step,
-            b => (b + 1) as f64 * layout.base_knot_spacing(),
+            b if b + 1 == spline.blocks() => layout.intervals as f64 * layout.time_step,
+            b => (b + 1) as f64 * spline.spacing,
         };
         x[6 * block..6 * block + 6].copy_from_slice(&path.at(t));
     }
     x[..6].copy_from_slice(&path.ends[0]);
+}
+
+/// What the scenario gives of the state at the start and of the velocity at the end.
+fn set_given(model: &Model, x: &mut [f64]) {
+    let layout = &model.layout;
+    let (spline, h) = (&layout.base_spline, layout.base_spline.spacing);
+    if let (Some(first), Some(velocity)) = (spline.end, &model.goal_velocity) {
+        (0..3).for_each(|c| x[first + c] = h * velocity[c]);
+    }
+    let Some(start) = &model.start else { return };
+    x[..6].copy_from_slice(&start.base[0]);
+    if let Some(first) = spline.start {
+        for d in 0..6 {
+            x[first + d] = h * start.base[1][d];
+            x[first + 6 + d] = h * h * start.base[2][d];
+        }
+    }
+    for (variables, value) in start.variables(layout) {
+        x[variables].copy_from_slice(value.as_slice());
+    }
 }
 
 /// Puts each foothold on its patch or, where there is none, under the base where it is in the middle of the stance;

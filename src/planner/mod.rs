@@ -40,6 +40,7 @@ mod retiming;
 pub mod solve;
 pub mod stage;
 mod standing;
+mod start;
 mod steps;
 mod stopping;
 mod threads;

@@ -66,6 +66,8 @@ pub struct GaitProblem {
     initial: Vec<f64>,
     /// To start from, if there are any.
     pub multipliers: Option<Multipliers>,
+    /// Rows that a given start leaves no variable of.
+    given_rows: Vec<usize>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -173,7 +175,9 @@ impl GaitProblem {
             })
         });
         let (lower, upper) = variable_bounds(&model, &initial);
+        let given_rows = given_rows(&model, &jacobian, &lower, &upper, offsets[blocks.len()]);
         Self {
+            given_rows,
             evaluated: initial.clone(),
             curved: exact_hessian,
             jacobian_split: ThreadSplit::new(&jacobian, 0..blocks.len(), model.threads),
@@ -242,8 +246,17 @@ impl GaitProblem {
     pub fn variable_name(&self, v: usize) -> String {
         let layout = &self.model.layout;
         let axis = |d: usize| ["x", "y", "z", "roll", "pitch", "yaw"][d];
-        if v < 6 * layout.base_blocks {
+        let spline = &layout.base_spline;
+        if v < 6 * spline.blocks() {
             return format!("base control point {} {}", v / 6, axis(v % 6));
+        }
+        let within = |first: &usize, count: usize| (*first..*first + count).contains(&v);
+        if let Some(first) = spline.start.filter(|first| within(first, 12)) {
+            let what = if v - first < 6 { "velocity" } else { "acceleration" };
+            return format!("base {what} at the start {}", axis((v - first) % 6));
+        }
+        if let Some(first) = spline.end.filter(|first| within(first, 6)) {
+            return format!("base velocity at the end {}", axis(v - first));
         }
         for (name, foot) in self.model.foot_names.iter().zip(&layout.feet) {
             for (j, stance) in foot.stances.iter().enumerate() {
@@ -275,7 +288,19 @@ impl GaitProblem {
     }
 }
 
-/// The base's first control points are pinned. Switches stay within their rooms. In F, the free control points of a swing stay
+/// Rows of which a given start leaves no variable: nothing that the solver could do would change them. They are judged by the check.
+fn given_rows(model: &Model, jacobian: &Pattern, lower: &[f64], upper: &[f64], rows: usize) -> Vec<usize> {
+    if model.start.is_none() {
+        return Vec::new();
+    }
+    let mut fixed = vec![true; rows];
+    for (row, column) in jacobian.rows.iter().zip(&jacobian.columns) {
+        fixed[*row as usize] &= lower[*column as usize] == upper[*column as usize];
+    }
+    (0..rows).filter(|row| fixed[*row]).collect()
+}
+
+/// What is given of the start, and of the base's velocity at the end, is pinned. Switches stay within their rooms. In F, the free control points of a swing stay
 /// above the ground: a spline obeys z̄ ≥ 0 at every instant if its control points do (Eq. 8, second line). With edges, z̄ = 0
 /// is the posture surface, which is not the ground.
 fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
@@ -283,6 +308,13 @@ fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut upper = vec![f64::INFINITY; model.layout.variables];
     lower[..6].copy_from_slice(&initial[..6]);
     upper[..6].copy_from_slice(&initial[..6]);
+    let spline = &model.layout.base_spline;
+    let rates = [(spline.start, 12), (spline.end, 6)];
+    let rates = rates.into_iter().filter_map(|(first, count)| first.map(|first| first..first + count));
+    let given = model.start.iter().flat_map(|start| start.variables(&model.layout)).map(|(range, _)| range);
+    for v in rates.chain(given).flatten() {
+        (lower[v], upper[v]) = (initial[v], initial[v]);
+    }
     for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
         if model.spaces.feet.is_warped() && !model.surfaces.have_edges() {
             for c in 0..model.layout.swing_shape.free() {
@@ -395,6 +427,9 @@ impl NlpProblem for GaitProblem {
         for (block, &first) in self.blocks.iter().zip(&self.offsets) {
             let rows = first..first + block.rows();
             block.bounds(&self.model, &mut lower[rows.clone()], &mut upper[rows]);
+        }
+        for &row in &self.given_rows {
+            (lower[row], upper[row]) = (f64::NEG_INFINITY, f64::INFINITY);
         }
     }
 

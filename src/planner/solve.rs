@@ -12,6 +12,7 @@ use super::motion::{Motion, Seconds};
 use super::options;
 use super::problem::{Choice, GaitProblem};
 use super::stage::Stage;
+use super::start;
 use super::steps::Steps;
 use super::stopping::StoppingRule;
 use super::violation;
@@ -62,11 +63,12 @@ impl Task<'_> {
         let spaces = Spaces::of(self.scenario.formulation(), map)?;
         let Self { scenario, robot, steps, surfaces, .. } = *self;
         let model = Model::new(scenario, robot, &steps.gait, surfaces.clone(), spaces);
-        self.with_visits(Model { patches: steps.patches.clone(), ..model })
+        self.completed(Model { patches: steps.patches.clone(), ..model })
     }
 
-    /// The model with the times at which the guess passes the way-points.
-    fn with_visits(&self, mut model: Model) -> Result<Model> {
+    /// The model with the given state at the start, and with the times at which the guess passes the way-points.
+    fn completed(&self, mut model: Model) -> Result<Model> {
+        start::set(self.scenario, &mut model)?;
         model.visits = BasePath::new(self.scenario, &model)?.visits(self.scenario);
         Ok(model)
     }
@@ -116,8 +118,8 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
     let steps = match solver.continuation {
         _ if is_level(&task.surfaces.posture) => 0,
-        // Patches of a lower ground are not those of the whole one.
-        _ if task.surfaces.have_edges() => 0,
+        // Patches of a lower ground are not those of the whole one, nor is a given start on it.
+        _ if task.surfaces.have_edges() || task.scenario.start.state.is_some() => 0,
         Continuation::Mode(ContinuationMode::Off) => 0,
         Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
         Continuation::Steps(n) => n,
@@ -303,7 +305,7 @@ impl<'a> Solve<'a> {
         let kept = surfaces.clone();
         let lower = Surfaces { keep_out: kept.keep_out, bends: kept.bends, ..Surfaces::one(ground) };
         let model = Model::new(scenario, robot, &steps.gait, lower, spaces);
-        self.task.with_visits(model).map(Some)
+        self.task.completed(model).map(Some)
     }
 
     /// Solves again with what the legs' mass adds to the laws along the last motion, until that no longer changes.

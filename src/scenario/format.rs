@@ -10,8 +10,9 @@ use super::gait::GaitSpec;
 use super::goal::GoalSpec;
 use super::keep_out::KeepOutSpec;
 use super::map::MapSpec;
-use super::motion::{ContactSpec, DiscretizationSpec, Footholds, Legs, MotionSpec, PhysicsSpec, StartSpec};
+use super::motion::{ContactSpec, DiscretizationSpec, Footholds, Legs, MotionSpec, PhysicsSpec};
 use super::solver::SolverSpec;
+use super::start::StartSpec;
 use super::terrain::TerrainSpec;
 use crate::input;
 use crate::robot::RobotSpec;
@@ -24,7 +25,8 @@ pub struct Scenario {
     #[serde(default = "default_schema")]
     #[schemars(range(min = 1, max = 1))]
     pub schema: u32,
-    /// The space in which the variables live; default: hybrid where feet stand on patches, else warped.
+    /// The space in which the variables live; default: hybrid where feet stand on patches or the motion starts or ends
+    /// moving, else warped.
     pub formulation: Option<Formulation>,
     /// Duration of the motion T, s.
     #[serde(default = "default_horizon")]
@@ -85,17 +87,22 @@ impl Scenario {
     /// The space in which the variables live.
     pub fn formulation(&self) -> Formulation {
         self.formulation.unwrap_or(match self.footholds() {
-            Footholds::Patches => Formulation::Hybrid,
-            Footholds::Anywhere => Formulation::Warped,
+            Footholds::Anywhere if !self.moves_at_ends() => Formulation::Warped,
+            _ => Formulation::Hybrid,
         })
+    }
+
+    /// Whether the base moves at the start or at the end.
+    pub fn moves_at_ends(&self) -> bool {
+        self.start.moves() || self.goal.velocity.is_some()
     }
 
     /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is
     /// massless: massive legs cost iterations and reach there (docs/results.md). So it is with flight, in which nothing holds the trunk
-    /// against the legs, and what they add often does not settle.
+    /// against the legs, and what they add often does not settle, and where the motion starts or ends moving.
     pub fn legs(&self) -> Legs {
         self.physics.legs.unwrap_or(match self.footholds() {
-            Footholds::Anywhere if !self.gait.flies() => Legs::Massive,
+            Footholds::Anywhere if !self.gait.flies() && !self.moves_at_ends() => Legs::Massive,
             _ => Legs::Massless,
         })
     }

@@ -19,6 +19,10 @@ pub struct GoalSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -20, max = 20))]
     pub turns: Option<i32>,
+    /// Velocity of the base at the end along x and y, m/s; default: at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -20.0, max = 20.0)))]
+    pub velocity: Option<[f64; 2]>,
     /// Mean speed along the way, m/s, from which the horizon follows where that is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.001, max = 10.0))]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::consistency;
+use super::continued;
 use super::format::Scenario;
 use super::way;
 use crate::digest::sha256_hex;
@@ -17,7 +18,7 @@ pub struct LoadedScenario {
     pub scenario: Scenario,
     /// The robot that it names.
     pub robot: Robot,
-    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, a gait with flight, or a robot that is not of
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, a gait with flight, a plan to go on from, or a robot that is not of
     /// ANYmal's size, all values with these, with the horizon that follows, and with the time step and the lengths that go by gait and size.
     pub effective_text: String,
     /// The user's own text, exactly as it was read.
@@ -29,6 +30,8 @@ pub struct LoadedScenario {
     /// Name and SHA-256 (hexadecimal) of each file read so far: the scenario's and the robot's, where these are files.
     pub inputs: Vec<(String, String)>,
     document: Document,
+    /// The plan that it goes on from.
+    start_plan: Option<PathBuf>,
     /// The scenario's file; none for one in memory.
     file: Option<PathBuf>,
 }
@@ -38,7 +41,8 @@ impl LoadedScenario {
     pub fn files(&self) -> Vec<PathBuf> {
         let Scenario { robot, terrain, .. } = &self.scenario;
         let named = [robot.file.as_deref(), terrain.file()].into_iter().flatten();
-        named.map(|name| self.base_dir.join(name)).chain(self.file.clone()).collect()
+        let own = self.file.iter().chain(&self.start_plan).cloned();
+        named.map(|name| self.base_dir.join(name)).chain(own).collect()
     }
 
     /// Paths of files that were read later, such as those that a terrain file names.
@@ -116,6 +120,7 @@ fn assemble(
     for assignment in overrides {
         document.set(assignment)?;
     }
+    let start_plan = continued::expand(&mut document, &base_dir)?;
     let scenario = read(&document)?;
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
     way::check_speed(&document, &scenario, &robot)?;
@@ -128,7 +133,7 @@ fn assemble(
     };
     let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
     let by_gait = set_by_gait(&mut document, &scenario)?;
-    let changed = by_size || by_speed || by_gait;
+    let changed = by_size || by_speed || by_gait || start_plan.is_some();
     let scenario = if changed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
     let effective_text = match overrides {
@@ -136,7 +141,8 @@ fn assemble(
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
-        inputs: robot.input.iter().cloned().collect(),
+        start_plan: start_plan.as_ref().map(|(name, _)| base_dir.join(name)),
+        inputs: robot.input.iter().cloned().chain(start_plan).collect(),
         scenario,
         robot,
         effective_text,

@@ -6,6 +6,8 @@
 mod condition_checks;
 mod conditions;
 mod consistency;
+mod continued;
+mod ends;
 pub mod examples;
 mod format;
 mod gait;
@@ -18,6 +20,7 @@ mod motion;
 mod section;
 mod sequence;
 mod solver;
+mod start;
 mod stops;
 mod template;
 pub mod terrain;
@@ -34,12 +37,11 @@ pub use goal::{CircleSpec, GoalSpec, WaypointSpec};
 pub use keep_out::KeepOutSpec;
 pub use load::{LoadedScenario, load, load_text, parse};
 pub use map::{MapMethod, MapScale, MapSpec};
-pub use motion::{
-    Cone, ContactSpec, DiscretizationSpec, Footholds, Law, Legs, MotionSpec, PhysicsSpec, StartSpec,
-};
+pub use motion::{Cone, ContactSpec, DiscretizationSpec, Footholds, Law, Legs, MotionSpec, PhysicsSpec};
 pub use section::SectionSpec;
 pub use sequence::section_key;
 pub use solver::{Continuation, ContinuationMode, Effort, Hessian, SolverSpec};
+pub use start::{StartSpec, StartState};
 pub use stops::{Stop, wrapped};
 pub use template::template;
 pub use terrain::TerrainSpec;

@@ -1,17 +1,7 @@
-//! `[start]`, `[motion]`, `[contact]`, `[physics]` and `[discretization]`: where the motion starts, and which laws it obeys.
+//! `[motion]`, `[contact]`, `[physics]` and `[discretization]`: which laws the motion obeys.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// `[start]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StartSpec {
-    /// x, y of the base, m.
-    pub position: [f64; 2],
-    /// Heading, rad; default: toward the goal.
-    pub yaw: Option<f64>,
-}
 
 /// `[motion]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

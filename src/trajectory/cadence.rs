@@ -16,6 +16,11 @@ const TURNS: f64 = 4.0;
 /// Lengths of the cycles with flight, in units of the time √(h/g) that a robot of the standing height h takes to fall by half of it.
 const FLYING_TROT_CYCLE: f64 = 2.1;
 const HOP_CYCLE: f64 = 2.2;
+/// Froude numbers v²/(g h) up to which trot, tripod, pace and bound have their usual cadence, and from which on they have that of a flying
+/// trot.
+const SPEEDS: [f64; 2] = [0.05, 0.5];
+/// Time at both ends in which the base hardly moves, s.
+const ENDS: f64 = 1.0;
 /// m/s².
 const GRAVITY: f64 = 9.81;
 
@@ -35,6 +40,13 @@ pub(super) struct Cadence {
     pub cycle: f64,
     /// Fraction of it that the foot stands.
     pub duty: f64,
+}
+
+/// How far the mean speed is from an ordinary one to one for which the feet must leave the ground, 0 to 1; in proportion to the speed.
+fn quickness(scenario: &Scenario, robot: &Robot) -> f64 {
+    let speed = scenario.way_length() / (scenario.horizon - ENDS).max(scenario.time_step);
+    let [ordinary, flying] = SPEEDS.map(|froude| (froude * GRAVITY * robot.standing_height()).sqrt());
+    ((speed - ordinary) / (flying - ordinary)).clamp(0.0, 1.0)
 }
 
 impl Cadence {
@@ -72,13 +84,18 @@ impl Cadence {
                 Self { cycle: even(HOP_CYCLE * falling), duty: 0.65 }
             }
             GaitKind::Hop | GaitKind::Pronk => Self { cycle: even(HOP_CYCLE * falling), duty: 0.55 },
-            GaitKind::Trot
-            | GaitKind::Tripod
-            | GaitKind::Pace
-            | GaitKind::Bound
-            | GaitKind::Stand
-            | GaitKind::Custom => Self { cycle, duty: 0.6 },
+            GaitKind::Trot | GaitKind::Tripod | GaitKind::Pace | GaitKind::Bound => {
+                let quick = Self { cycle: FLYING_TROT_CYCLE * falling, duty: 0.4 };
+                Self { cycle, duty: 0.6 }.toward(quick, quickness(scenario, robot))
+            }
+            GaitKind::Stand | GaitKind::Custom => Self { cycle, duty: 0.6 },
         }
+    }
+
+    /// A fraction of the way to another cadence.
+    fn toward(self, other: Self, fraction: f64) -> Self {
+        let between = |a: f64, b: f64| a + fraction * (b - a);
+        Self { cycle: between(self.cycle, other.cycle), duty: between(self.duty, other.duty) }
     }
 
     /// With cycles of a fraction of the length, and swings that last as long.
@@ -127,5 +144,28 @@ impl Cadence {
                 .collect()
         };
         Ok(lift_offs.iter().map(of_foot).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::load_text;
+
+    fn trot(goal: f64) -> Cadence {
+        let text = format!(
+            "horizon = 5.0\n[terrain]\nkind = \"flat\"\nextent = [-1.0, 20.0, -1.0, 1.0]\n[start]\nposition = [0.0, 0.0]\n\
+             [goal]\nposition = [{goal:?}, 0.0]\n[gait]\nkind = \"trot\"\n"
+        );
+        let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+        Cadence::of(&loaded.scenario.gait.sections()[0], &loaded.scenario, &loaded.robot)
+    }
+
+    #[test]
+    fn a_trot_is_quicker_and_flies_at_high_speed_only() {
+        let [slow, fast, fastest] = [1.0, 4.0, 8.0].map(trot);
+        assert_eq!(slow, Cadence { cycle: 1.2, duty: 0.6 });
+        assert!(fast.cycle < slow.cycle && fast.duty < slow.duty && fast.duty > fastest.duty);
+        assert!((fastest.duty - 0.4).abs() < 1e-12 && fastest.cycle < 0.5, "{fastest:?}");
     }
 }

@@ -112,16 +112,20 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
             cadence = cadence.with_cycle(fraction);
         }
         let alone = |neighbor: Option<&SectionSpec>| neighbor.is_none_or(|s| !s.kind.is_cyclic());
-        // At the ends, beside a section that stands, between two that step.
-        let stand = |neighbor: Option<&SectionSpec>| match neighbor {
-            None => STAND,
+        // At ends at rest, beside a section that stands, and where the robot goes on moving.
+        let stand = |(neighbor, moves): (Option<&SectionSpec>, bool)| match neighbor {
+            None if !moves => STAND,
             Some(_) if alone(neighbor) => 0.0,
-            Some(_) => CHANGE,
+            _ => CHANGE,
         };
         let window = Window {
             from: if n == 0 { 0.0 } else { ends[n - 1] },
             to: ends[n],
-            stand: [n.checked_sub(1).map(|n| &sections[n]), sections.get(n + 1)].map(stand),
+            stand: [
+                (n.checked_sub(1).map(|n| &sections[n]), scenario.start.moves()),
+                (sections.get(n + 1), scenario.goal.velocity.is_some()),
+            ]
+            .map(stand),
         };
         let lift_offs = lift_offs(section.kind, robot).map_err(keyed)?;
         let more = cadence.swings(&lift_offs, &window, scenario.time_step).map_err(keyed)?;

@@ -2,7 +2,7 @@
 //!
 //! | block | variables |
 //! | --- | --- |
-//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, if coarser, at about every n-th); the first three coincide, and so do the last three, so that the motion starts and ends at rest |
+//! | base | control points (p̄, θ̄) of a uniform cubic B-spline with a knot at every sample (or, if coarser, at about every n-th); at an end at rest three coincide, else they are those of a velocity and an acceleration ([`super::base`]) |
 //! | footholds | (x̄, ȳ, z̄) of each stance |
 //! | swings | the inner control points of a clamped cubic B-spline; its outer ones on each side are the footholds, so that feet lift off and touch down at rest ([`SwingShape`]) |
 //! | forces | f̄ at every sample of a stance (or, if coarser, at about every n-th) except at the switches, where it is zero; linear in between |
@@ -15,6 +15,7 @@
 
 use std::ops::Range;
 
+use super::base::BaseSpline;
 use super::gait::Gait;
 use super::instant::Instant;
 use super::node::LinearNode;
@@ -22,7 +23,6 @@ use super::phase::Stance;
 use super::spline::{SwingShape, swing_basis};
 use super::switches::{TimedNode, force_samples};
 use super::variables::{FootVariables, StanceVariables, SwingVariables};
-use crate::bspline::uniform_cubic;
 
 /// Distance between knots, in samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +51,8 @@ pub struct Layout {
     pub intervals: usize,
     /// Number of variables.
     pub variables: usize,
-    /// Number of knot intervals of the base.
-    pub base_intervals: usize,
+    /// The variables of the base's spline.
+    pub base_spline: BaseSpline,
     /// The base at each sample, six components.
     pub base: Vec<LinearNode>,
     /// The base halfway from each sample to the next.
@@ -61,8 +61,6 @@ pub struct Layout {
     pub base_rates: Vec<[LinearNode; 2]>,
     /// How swings are made of control points.
     pub swing_shape: SwingShape,
-    /// Number of distinct control points of the base.
-    pub base_blocks: usize,
     /// The variables of each foot.
     pub feet: Vec<FootVariables>,
     /// `phase[foot][k]`.
@@ -74,10 +72,16 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The variables for a gait.
-    pub fn new(gait: &Gait, time_step: f64, spacing: KnotSpacing, swing_shape: SwingShape) -> Self {
+    /// The variables for a gait, and whether the base moves at the start and at the end.
+    pub fn new(
+        gait: &Gait,
+        time_step: f64,
+        spacing: KnotSpacing,
+        swing_shape: SwingShape,
+        moves: [bool; 2],
+    ) -> Self {
         let base_intervals = pieces(gait.intervals, spacing.base).max(2);
-        Self::with_base_intervals(gait, time_step, base_intervals, spacing.force, swing_shape)
+        Self::with_base_intervals(gait, time_step, base_intervals, spacing.force, (swing_shape, moves))
     }
 
     /// The same with a given number of knot intervals of the base, at least two.
@@ -86,19 +90,29 @@ impl Layout {
         time_step: f64,
         base_intervals: usize,
         force: usize,
-        swing_shape: SwingShape,
+        (swing_shape, moves): (SwingShape, [bool; 2]),
     ) -> Self {
-        let base_blocks = base_intervals - 1;
+        let mut base_spline = BaseSpline {
+            intervals: base_intervals,
+            spacing: time_step * gait.intervals as f64 / base_intervals as f64,
+            start: None,
+            end: None,
+        };
+        let mut variables = 6 * base_spline.blocks();
+        let mut rates = |moves: bool, count: usize| {
+            variables += if moves { count } else { 0 };
+            moves.then(|| variables - count)
+        };
+        (base_spline.start, base_spline.end) = (rates(moves[0], 12), rates(moves[1], 6));
         let mut layout = Self {
             time_step,
             intervals: gait.intervals,
-            variables: 6 * base_blocks,
-            base_intervals,
+            variables,
+            base_spline,
             base: Vec::new(),
             base_between: Vec::new(),
             base_rates: Vec::new(),
             swing_shape,
-            base_blocks,
             feet: Vec::new(),
             phase: Vec::new(),
             phase_between: Vec::new(),
@@ -207,19 +221,21 @@ impl Layout {
 
     /// The same motion with a base whose spline has a knot at every 1/`factor` of a sample, and the variables that go with it: control
     /// points through given values at these knots, of which there are `factor` times the intervals and one more. None if the present knots
-    /// are not among them.
+    /// are not among them, or the base moves at an end.
     ///
     /// A cubic spline with finer knots can equal any with coarser ones, so what is the same at the knots is the same between them. (At the
     /// two knots next to the ends, where the base is at rest, the values are those that follow from the others.)
     pub fn with_fine_base(&self, x: &[f64], factor: usize, values: &[[f64; 6]]) -> Option<(Self, Vec<f64>)> {
         let fine = self.intervals * factor;
-        if !fine.is_multiple_of(self.base_intervals) || values.len() != fine + 1 {
+        let spline = &self.base_spline;
+        let rest = spline.start.or(spline.end).is_none();
+        if !(rest && fine.is_multiple_of(spline.intervals) && values.len() == fine + 1) {
             return None;
         }
-        let (before, mut layout) = (6 * self.base_blocks, self.clone());
-        layout.base_intervals = fine;
-        layout.base_blocks = fine - 1;
-        let more = 6 * layout.base_blocks - before;
+        let (before, mut layout) = (6 * spline.blocks(), self.clone());
+        layout.base_spline.intervals = fine;
+        layout.base_spline.spacing = self.time_step / factor as f64;
+        let more = 6 * layout.base_spline.blocks() - before;
         layout.variables += more;
         layout.feet.iter_mut().for_each(|foot| foot.move_variables(more));
         layout.set_base();
@@ -253,29 +269,9 @@ impl Layout {
         self.feet.iter().flat_map(|f| &f.swings).any(|s| s.switches.is_some())
     }
 
-    /// The first of the six variables of a control point of the base, 0 ≤ control_point < base_intervals + 3.
-    pub fn base_block(&self, control_point: usize) -> usize {
-        6 * control_point.clamp(2, self.base_intervals).saturating_sub(2)
-    }
-
-    /// Distance between the knots of the base, s.
-    pub fn base_knot_spacing(&self) -> f64 {
-        self.time_step * self.intervals as f64 / self.base_intervals as f64
-    }
-
     /// The base at time `k` in samples (any real number in range), or its first or second derivative with respect to time.
     pub fn base_node(&self, k: f64, derivative: usize) -> LinearNode {
-        let k = k * (self.base_intervals as f64 / self.intervals as f64);
-        let interval = (k.max(0.0) as usize).min(self.base_intervals - 1);
-        let weights = uniform_cubic(k - interval as f64)[derivative];
-        let scale = self.base_knot_spacing().powi(-(derivative as i32));
-        let mut node = LinearNode::default();
-        for (a, weight) in weights.iter().enumerate() {
-            node.push(self.base_block(interval + a), weight * scale);
-        }
-        // Where control points coincide, their weights may cancel.
-        node.terms.retain(|(_, w)| w.abs() > CANCELLED * scale);
-        node
+        self.base_spline.node(k * (self.base_spline.intervals as f64 / self.intervals as f64), derivative)
     }
 
     /// The base at an instant, six components.
@@ -396,9 +392,6 @@ pub fn solve_tridiagonal<const D: usize>(diagonal: f64, beside: f64, values: &mu
     }
 }
 
-/// Weights below this, relative to the scale of a derivative, are zero up to rounding.
-const CANCELLED: f64 = 1e-14;
-
 /// The number of pieces of about `spacing` samples in `length`.
 fn pieces(length: usize, spacing: usize) -> usize {
     ((length as f64 / spacing as f64).round() as usize).clamp(1, length)
@@ -418,7 +411,7 @@ mod tests {
             intervals: 20,
             swings: vec![vec![Swing::given(4.0, 8.0)], vec![Swing::given(10.0, 15.0)], vec![], vec![]],
         };
-        Layout::new(&gait, 0.05, spacing, SwingShape::Light)
+        Layout::new(&gait, 0.05, spacing, SwingShape::Light, [false; 2])
     }
 
     #[test]
@@ -426,7 +419,7 @@ mod tests {
         let spacing = KnotSpacing { base: 3, force: 2 };
         let layout = layout_of(spacing);
         // 20 samples make 7 intervals of the base; the stance of 4 samples has nodes at 0, at 2 and, fixed at zero, at 4.
-        assert_eq!((layout.base_intervals, layout.base_blocks), (7, 6));
+        assert_eq!((layout.base_spline.intervals, layout.base_spline.blocks()), (7, 6));
         let stance = &layout.feet[0].stances[0];
         let first = stance.force(0).expect("the motion starts here").first();
         let second = stance.force(2).expect("inside").first();
@@ -435,7 +428,7 @@ mod tests {
         assert!(stance.force(4).is_none());
         // A spline whose control points are on a line is that line, and its derivative the slope.
         let mut x = vec![0.0; layout.variables];
-        for block in 0..layout.base_blocks {
+        for block in 0..layout.base_spline.blocks() {
             x[6 * block] = block as f64;
         }
         let velocity = layout.base_node(10.0, 1).value::<6>(&x)[0];

@@ -3,6 +3,7 @@
 //!
 //! The two formulations differ in [`space`] alone.
 
+pub mod base;
 mod cadence;
 mod footfall;
 pub mod gait;

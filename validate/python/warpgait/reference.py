@@ -13,6 +13,8 @@ from .geometry import rotation_from_wxyz
 from .plan import Plan
 from .rolling import Rolling, no_rolling
 
+AT_REST = 1e-3  # m/s, rad/s: slower than this the trunk is at rest
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -31,6 +33,11 @@ class Reference:
     normal: Array  # (K, E, 3) of the terrain in stance; in the air, from contact point to center
     force: Array  # (K, E, 3)
     contact: Bools  # (K, E)
+
+    @property
+    def moves_at_start(self) -> bool:
+        """Whether the trunk moves at the first sample: the plan goes on from a motion."""
+        return bool(max(np.linalg.norm(self.com_velocity[0]), np.linalg.norm(self.angular_velocity[0])) > AT_REST)
 
 
 def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None = None) -> Reference:

@@ -121,14 +121,32 @@ class Simulation:
         self._first_stray: Incident | None = None
 
     def run(self) -> Replay:
-        """Let the robot settle on the first sample, then follow the reference to its end or to a fall."""
+        """Let the robot settle on the first sample, or set it in motion as it is there, then follow the reference to its end or to a fall."""
         settling_steps = round(SETTLING_TIME / self._period)
+        if self._reference.moves_at_start:
+            self._set_in_motion()
+            settling_steps = 0
         with _muted():
             for step in range(-settling_steps, len(self._reference.t)):
                 self._control_period(step)
                 if self._fall is not None:
                     break
         return self._replay()
+
+    def _set_in_motion(self) -> None:
+        """Give the trunk its velocities at the first sample, and the joints those at which the feet stay where they are."""
+        data, world, index, reference = self._data, self._world, self._index, self._reference
+        mujoco.mj_forward(world, data)
+        omega = reference.angular_velocity[0]
+        rotation = data.xmat[index.base].reshape(3, 3)
+        arm = data.subtree_com[index.base] - data.xpos[index.base]
+        data.qvel[:3] = reference.com_velocity[0] - np.cross(omega, arm)
+        data.qvel[3:6] = rotation.T @ omega
+        jacobian = np.zeros((len(index.feet), 3, world.nv))
+        for rows, geom, body in zip(jacobian, index.geom, index.body, strict=True):
+            mujoco.mj_jac(world, data, rows, None, data.geom_xpos[geom], body)
+        feet = jacobian.reshape(-1, world.nv)
+        data.qvel[6:] = np.linalg.lstsq(feet[:, 6:], -feet[:, :6] @ data.qvel[:6], rcond=None)[0]
 
     def _control_period(self, step: int) -> None:
         """One control step and its physics steps. Negative steps settle on the first sample of the reference and are not recorded."""

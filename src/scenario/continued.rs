@@ -1,0 +1,120 @@
+//! `start.plan`: a motion that goes on where another plan is left. What is read of that plan becomes `start.position`, `start.yaw` and
+//! `start.state`, so that the new plan needs nothing but itself.
+
+use std::path::Path;
+
+use crate::digest::sha256_hex;
+use crate::files;
+use crate::files::npz::NpzReader;
+use crate::input::Document;
+use crate::{Error, Result};
+
+/// A file that was read: its name in the scenario and its SHA-256.
+type Input = (String, String);
+
+/// Reads what `start.plan` names, if anything, and sets the keys that follow. Returns the file.
+///
+/// # Errors
+/// For a plan that cannot be read or has a foot in the air at that time, and for keys that it would set.
+pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<Input>> {
+    let start = document.table().get("start").and_then(toml::Value::as_table);
+    let Some(name) = start.and_then(|start| start.get("plan")).and_then(toml::Value::as_str) else {
+        if document.has("start.time") {
+            return Err(document.error(
+                "start.time",
+                "given without start.plan, the plan that is left at that time; remove it",
+            ));
+        }
+        return Ok(None);
+    };
+    let name = name.to_owned();
+    for key in ["start.position", "start.yaw", "start.state"] {
+        if document.has(key) {
+            let what = format!(
+                "given together with start.plan ({}), which sets it; remove one of them",
+                document.place("start.plan")
+            );
+            return Err(document.error(key, what));
+        }
+    }
+    let time = start.and_then(|start| start.get("time")).and_then(number);
+    let path = base_dir.join(&name);
+    let located = |e: Error| document.error("start.plan", e);
+    let digest = sha256_hex(files::read(&path, files::MAX_FILE).map_err(located)?);
+    let keys = keys(&path, time).map_err(|(key, e)| document.error(key, e))?;
+    for assignment in keys {
+        document.set(&assignment)?;
+    }
+    document.remove("start", "plan");
+    document.remove("start", "time");
+    Ok(Some((name, digest)))
+}
+
+/// An integer or a float.
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
+}
+
+/// `key=value` for each key that the plan sets; on failure, the key that is to blame.
+fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'static str, Error)> {
+    let plan = |e: Error| ("start.plan", e);
+    let mut npz = NpzReader::open(path).map_err(plan)?;
+    let (_, t) = npz.finite_f64("t").map_err(plan)?;
+    let (n, last) = (t.len(), t.last().copied().unwrap_or(0.0));
+    if n < 2 || last <= 0.0 {
+        return Err(plan(npz.error("t", "has no samples")));
+    }
+    let time = time.unwrap_or(last);
+    if !(0.0..=last + 1e-9).contains(&time) {
+        let what = Error::input(format!("given {time} s, allowed: 0 to {last} s, the end of that plan"));
+        return Err(("start.time", what));
+    }
+    let k = ((time / last * (n - 1) as f64).round() as usize).min(n - 1);
+    let mut at = |member: &str| -> std::result::Result<[f64; 3], (&'static str, Error)> {
+        Ok(npz.points::<3>(member, &[n]).map_err(plan)?[k])
+    };
+    let [x, y, z] = at("base_position")?;
+    let velocity = at("base_linear_velocity")?;
+    let acceleration = at("base_linear_acceleration")?;
+    let angular_velocity = at("base_angular_velocity")?;
+    let angular_acceleration = at("base_angular_acceleration")?;
+    let quaternion = npz.points::<4>("base_quaternion_wxyz", &[n]).map_err(plan)?[k];
+    let (_, names) = npz.str("foot_names").map_err(plan)?;
+    let e = names.len();
+    let contact = npz.bool("foot_contact", &[n, e]).map_err(plan)?;
+    if let Some(foot) = (0..e).find(|foot| !contact[k * e + foot]) {
+        let all = |k: &usize| (0..e).all(|foot| contact[k * e + foot]);
+        let near = (0..n).filter(all).min_by_key(|other| other.abs_diff(k)).map_or(0.0, |k| t[k]);
+        let what = Error::input(format!(
+            "at {time} s foot {} is in the air; allowed: a time when all feet stand, such as {near} s",
+            names[foot]
+        ));
+        return Err(("start.time", what));
+    }
+    let mut of_feet = |member: &str| -> std::result::Result<Vec<[f64; 3]>, (&'static str, Error)> {
+        Ok(npz.points::<3>(member, &[n, e]).map_err(plan)?[k * e..][..e].to_vec())
+    };
+    let (feet, forces) = (of_feet("foot_position")?, of_feet("foot_force")?);
+    let [roll, pitch, yaw] = angles(quaternion);
+    Ok(vec![
+        format!("start.position=[{x:?}, {y:?}]"),
+        format!("start.yaw={yaw:?}"),
+        format!("start.state.height={z:?}"),
+        format!("start.state.tilt=[{roll:?}, {pitch:?}]"),
+        format!("start.state.velocity={velocity:?}"),
+        format!("start.state.angular_velocity={angular_velocity:?}"),
+        format!("start.state.acceleration={acceleration:?}"),
+        format!("start.state.angular_acceleration={angular_acceleration:?}"),
+        format!("start.state.feet={feet:?}"),
+        format!("start.state.forces={forces:?}"),
+    ])
+}
+
+/// Roll, pitch and yaw of a unit quaternion w, x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll).
+fn angles([w, x, y, z]: [f64; 4]) -> [f64; 3] {
+    [
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y)),
+        (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
+        (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z)),
+    ]
+}

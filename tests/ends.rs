@@ -1,0 +1,114 @@
+//! Motions that start or end moving, from a given state, and one after the other.
+
+use std::path::Path;
+
+use crate::common::solved_in;
+use warpgait::check::{CheckReport, check};
+use warpgait::plan::Plan;
+
+fn failed(report: &CheckReport) -> Vec<String> {
+    report.rows.iter().filter(|row| !row.passed).map(|row| format!("{} = {}", row.name, row.value)).collect()
+}
+
+/// Solved with every check held.
+fn plan(folder: &Path, text: &str) -> Plan {
+    let (motion, plan) = solved_in(folder, text);
+    assert!(motion.solved, "{}; {:?}", motion.status, motion.violations);
+    assert_eq!(failed(&check(&plan).expect("a sound plan")), Vec::<String>::new());
+    plan
+}
+
+const GROUND: &str = "horizon = 3.0\n[terrain]\nkind = \"rippled\"\nlevel = \"easy\"\nspacing = 0.05\n[gait]\nkind = \"trot\"\ncycle = 0.8\nduty = 0.6\n";
+
+fn last<T: Copy>(values: &[T]) -> T {
+    values[values.len() - 1]
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn a_plan_goes_on_where_another_ends_in_motion_or_at_rest() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (robot, velocity) in [("anymal_towr", "velocity = [0.25, 0.05]\n"), ("anymal_c", "")] {
+        let head = format!("{GROUND}[robot]\nname = \"{robot}\"\n");
+        let first = plan(
+            folder.path(),
+            &format!("{head}[start]\nposition = [-0.5, 0.0]\n[goal]\nposition = [0.0, 0.1]\n{velocity}"),
+        );
+        first.write(&folder.path().join("first.plan.npz")).expect("a file");
+        let text = format!("{head}[start]\nplan = \"first.plan.npz\"\n[goal]\nposition = [0.5, 0.0]\n");
+        let second = plan(folder.path(), &text);
+        for (what, a, b, tolerance) in [
+            ("position", last(&first.base_position), second.base_position[0], 1e-6),
+            ("velocity", last(&first.base_linear_velocity), second.base_linear_velocity[0], 1e-6),
+            ("acceleration", last(&first.base_linear_acceleration), second.base_linear_acceleration[0], 1e-5),
+            ("turning", last(&first.base_angular_velocity), second.base_angular_velocity[0], 1e-6),
+        ] {
+            assert!(distance(a, b) < tolerance, "{robot}: {what} jumps from {a:?} to {b:?}");
+        }
+        let feet = first.foot_position.len() - 4;
+        for e in 0..4 {
+            let (a, b) = (first.foot_position[feet + e], second.foot_position[e]);
+            assert!(distance(a, b) < 1e-6, "{robot}: foot {e} jumps from {a:?} to {b:?}");
+            let (a, b) = (first.foot_force[feet + e], second.foot_force[e]);
+            assert!(distance(a, b) < 1e-3, "{robot}: force {e} jumps from {a:?} to {b:?}");
+        }
+        // The plan is whole without the one before it, and its splines can be read.
+        assert!(!second.meta.scenario.contains("first.plan.npz") && second.motion().is_ok());
+        assert!(second.meta.inputs.iter().any(|(name, _)| name == "first.plan.npz"));
+    }
+}
+
+#[test]
+fn a_motion_starts_with_a_given_velocity_and_the_check_sees_another() {
+    let text = format!(
+        "formulation = \"direct\"\n{GROUND}[robot]\nname = \"anymal_towr\"\n[start]\nposition = [0.0, 0.0]\nstate = {{ velocity = [0.3, 0.0, 0.0], angular_velocity = [0.0, 0.0, 0.2] }}\n\
+         [goal]\nposition = [0.6, 0.1]\nvelocity = [0.3, 0.1]\n"
+    );
+    let mut plan = plan(".".as_ref(), &text);
+    assert!(distance(plan.base_linear_velocity[0], [0.3, 0.0, 0.0]) < 1e-9);
+    for (from, to) in [
+        ("velocity = [0.3, 0.0, 0.0]", "velocity = [0.31, 0.0, 0.0]"),
+        ("velocity = [0.3, 0.1]", "velocity = [0.3, 0.0]"),
+    ] {
+        let scenario = plan.meta.scenario.clone();
+        assert!(scenario.contains(from));
+        plan.meta.scenario = scenario.replace(from, to);
+        let found = failed(&check(&plan).expect("a sound plan"));
+        assert!(found.iter().any(|row| row.starts_with("rest = ")), "{to}: {found:?}");
+        plan.meta.scenario = scenario;
+    }
+}
+
+#[test]
+fn starts_that_contradict_themselves_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let head = format!("{GROUND}[robot]\nname = \"anymal_towr\"\n[goal]\nposition = [0.5, 0.0]\n[start]\n");
+    let path = folder.path().join("before.plan.npz");
+    crate::common::standing().write(&path).expect("a file");
+    for (start, words) in [
+        ("plan = \"absent.plan.npz\"", "start.plan: "),
+        (
+            "plan = \"before.plan.npz\"\nposition = [0.0, 0.0]",
+            "start.position: given together with start.plan (start.plan, line",
+        ),
+        ("plan = \"before.plan.npz\"\ntime = 5.0", "start.time: given 5 s, allowed: 0 to 1 s"),
+        ("position = [0.0, 0.0]\ntime = 1.0", "start.time: given without start.plan"),
+        (
+            "position = [0.0, 0.0]\nstate.forces = [[0.0, 0.0, 0.0]]",
+            "start.state.forces: given without start.state.feet",
+        ),
+        ("position = [0.0, 0.0]\nstate.feet = [[0.0, 0.0, 0.0]]", "start.state.feet: given 1 rows"),
+        (
+            "position = [0.0, 0.0]\nstate.velocity = [0.1, 0.0, 0.0]\n[physics]\nlegs = \"massive\"",
+            "physics.legs: given \"massive\", but the base moves",
+        ),
+    ] {
+        let text = format!("{head}{start}\n");
+        let message =
+            warpgait::scenario::load_text("s.toml", &text, folder.path(), &[]).expect_err(start).to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}
