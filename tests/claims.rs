@@ -160,6 +160,7 @@ fn every_member_is_covered_by_a_law() {
         ripples("hybrid", "[gait]\ncycle = 1.2\nduty = 0.75\n").replace("anymal_towr", "anymal_c"),
         ripples("direct", WAYPOINTS),
         ripples("hybrid", CONDITIONS).replace("[-0.1, 0.0]", "[-0.1, 0.0]\nyaw = 0.1"),
+        ripples("hybrid", "[start.state]\nvelocity = [0.1, 0.0, 0.0]\nangular_velocity = [0.0, 0.0, 0.1]\n"),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();
