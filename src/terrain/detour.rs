@@ -211,7 +211,7 @@ mod tests {
     fn bends_of(keep_out: &str) -> Bends {
         let text = format!(
             "[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n[start]\nposition = [-1.2, 0.0]\n[goal]\nposition = [1.2, 0.0]\n\
-             [[goal.waypoints]]\nposition = [1.2, 0.6]\n{keep_out}"
+             [[goal.waypoints]]\nposition = [1.2, -0.4]\n{keep_out}"
         );
         let scenario: Scenario = toml::from_str(&text).expect("a scenario");
         let robot = Robot::load(&RobotSpec::default(), ".".as_ref()).expect("a robot");
