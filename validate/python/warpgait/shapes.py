@@ -1,4 +1,4 @@
-"""Boxes around meshes: STL, OBJ and COLLADA. Only places of vertices are read."""
+"""Boxes around meshes: STL, OBJ and COLLADA. Only places of vertices are read: what collides is their convex hull, as in MuJoCo."""
 
 from __future__ import annotations
 
@@ -7,15 +7,51 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from .arrays import Array
 from .errors import InputError
 
 LARGEST_MESH = 256 << 20  # bytes
+MOST_BOXES = 4  # around one mesh
 
 
-def mesh_bounds(path: Path) -> tuple[Array, Array]:
-    """Least and greatest corner (3,) of a mesh, in its file's units; those of COLLADA in m, z up."""
+def boxes_around(points: Array) -> list[tuple[Array, Array]]:
+    """Boxes, each with its least and its greatest corner (3,), that cover the convex hull of points (M, 3).
+
+    A long hull is cut across its longest edge; each piece gets a box of its own, so that a thin shank with a thick knee is not as thick all
+    along.
+    """
+    low, high = points.min(0), points.max(0)
+    edges = np.sort(high - low)
+    count = int(np.clip(np.round(2 * edges[2] / max(edges[1], 1e-9)) - 1, 1, MOST_BOXES))
+    axis = int(np.argmax(high - low))
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):  # flat, or too few points
+        return [(low, high)]
+    if count == 1:
+        return [(low, high)]
+    corners = points[hull.simplices]  # (F, 3, 3)
+    starts, ends = corners.reshape(-1, 3), np.roll(corners, 1, axis=1).reshape(-1, 3)
+    planes = np.linspace(low[axis], high[axis], count + 1)
+    cuts = []
+    for plane in planes[1:-1]:
+        crossing = (starts[:, axis] - plane) * (ends[:, axis] - plane) < 0
+        a, b = starts[crossing], ends[crossing]
+        cuts.append(a + (b - a) * ((plane - a[:, axis]) / (b[:, axis] - a[:, axis]))[:, None])
+    boxes = []
+    for k in range(count):
+        inside = starts[(starts[:, axis] >= planes[k]) & (starts[:, axis] <= planes[k + 1])]
+        piece = np.concatenate([inside, *cuts[max(k - 1, 0) : k + 1]])
+        least, greatest = piece.min(0), piece.max(0)
+        least[axis], greatest[axis] = planes[k], planes[k + 1]
+        boxes.append((least, greatest))
+    return boxes
+
+
+def mesh_points(path: Path) -> Array:
+    """The vertices (M, 3) of a mesh, in its file's units; those of COLLADA in m, z up."""
     readers = {".stl": _stl, ".obj": _obj, ".dae": _collada}
     reader = readers.get(path.suffix.lower())
     if reader is None:
@@ -28,7 +64,7 @@ def mesh_bounds(path: Path) -> tuple[Array, Array]:
         raise InputError(f"{path}: not a mesh that can be read: {error}") from error
     if not len(points) or not np.isfinite(points).all():
         raise InputError(f"{path}: the mesh has no vertices, or some that are not finite")
-    return points.min(0), points.max(0)
+    return points
 
 
 def _stl(content: bytes) -> Array:

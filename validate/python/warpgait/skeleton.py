@@ -16,6 +16,7 @@ import numpy as np
 from .arrays import Array
 from .errors import InputError
 from .model import JOINTS, merged
+from .shapes import boxes_around
 from .urdf import Limits
 
 FOOT_NAME = re.compile(r"foot|feet|toe|sole|contact|ankle|tip", re.IGNORECASE)
@@ -158,6 +159,19 @@ class Reader:
         box = m.geom_aabb[g]
         return Shape("box", place + rotation @ box[:3], rotation, np.maximum(box[3:], 1e-4))
 
+    def shapes(self, g: int) -> list[Shape]:
+        """A geom as one or more primitives: a mesh as boxes around parts of its convex hull."""
+        m, whole = self.model, self.shape(g)
+        if int(m.geom_type[g]) != int(mujoco.mjtGeom.mjGEOM_MESH):
+            return [whole]
+        first, count = int(m.mesh_vertadr[m.geom_dataid[g]]), int(m.mesh_vertnum[m.geom_dataid[g]])
+        place = self.data.geom_xpos[g] - self.data.xpos[self.base]
+        boxes = boxes_around(m.mesh_vert[first : first + count].astype(float))
+        return [
+            Shape("box", place + whole.rotation @ ((low + high) / 2), whole.rotation, np.maximum((high - low) / 2, 1e-4))
+            for low, high in boxes
+        ]
+
     def freeze(self, joint: int, angle: float) -> None:
         """Hold a joint at an angle."""
         self.frozen[joint] = angle
@@ -195,7 +209,7 @@ class Reader:
             mass=mass,
             center=center - origin,
             inertia=inertia,
-            shapes=[self.shape(g) for g in self.collision_geoms(bodies)],
+            shapes=[shape for g in self.collision_geoms(bodies) for shape in self.shapes(g)],
             limits=Limits() if joint is None else self.limits.get(self.joint_name(joint), Limits()),
         )
 
@@ -321,7 +335,7 @@ def leg_of(reader: Reader, leaf: int, named: set[str], radius: float | None) -> 
         )
     center, size, body, replaced = foot_of(reader, leaf, named, radius)
     links = [reader.link(int(m.jnt_bodyid[j]), j) for j in joints]
-    gone = [reader.shape(g) for g in replaced]
+    gone = [shape for g in replaced for shape in reader.shapes(g)]
     last = links[-1]
     kept = [s for s in last.shapes if not any(np.array_equal(s.center, f.center) and s.kind == f.kind for f in gone)]
     last.shapes[:] = kept

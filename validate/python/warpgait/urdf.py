@@ -1,11 +1,12 @@
 """URDF made readable for MuJoCo's compiler: what it would misread is refused or put right here, by the name of the link.
 
 MuJoCo takes the root link for a part of the world, ignores speed limits, and stops at meshes that are not there, at COLLADA, and at links without
-mass. Here visual shapes are left out, and a box takes the place of each mesh of a collision shape.
+mass. Here visual shapes are left out, and boxes take the place of each mesh of a collision shape.
 """
 
 from __future__ import annotations
 
+import copy
 import os
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError
-from .shapes import mesh_bounds
+from .shapes import boxes_around, mesh_points
 
 LEAST_MASS = (
     1e-6  # kg: MuJoCo refuses a moving link with less; whether a link with all that is fixed to it has mass is judged later
@@ -204,7 +205,7 @@ def resolve(name: str, folder: Path) -> Path | None:
 
 
 def _collisions(path: Path, link: ET.Element, without_meshes: bool, notes: list[str]) -> None:
-    """Put a box in the place of each mesh."""
+    """Put boxes in the place of each mesh."""
     name = link.attrib["name"]
     for collision in link.findall("collision"):
         geometry = collision.find("geometry")
@@ -222,12 +223,17 @@ def _collisions(path: Path, link: ET.Element, without_meshes: bool, notes: list[
             link.remove(collision)
             notes.append(f'link "{name}": its collision mesh {file} is not there and is left out')
             continue
-        low, high = mesh_bounds(found)
         scale = np.array((mesh.attrib.get("scale") or "1 1 1").split(), float)
-        low, high = np.minimum(low * scale, high * scale), np.maximum(low * scale, high * scale)
         geometry.remove(mesh)
-        ET.SubElement(geometry, "box", size=" ".join(f"{v:.9g}" for v in np.maximum(high - low, 1e-4)))
-        _move_origin(collision, (low + high) / 2)
+        link.remove(collision)
+        for low, high in boxes_around(mesh_points(found) * scale):
+            box = copy.deepcopy(collision)
+            box.attrib.pop("name", None)
+            shape = box.find("geometry")
+            if shape is not None:
+                ET.SubElement(shape, "box", size=" ".join(f"{v:.9g}" for v in np.maximum(high - low, 1e-4)))
+            _move_origin(box, (low + high) / 2)
+            link.append(box)
 
 
 def _move_origin(collision: ET.Element, by: Array) -> None:
