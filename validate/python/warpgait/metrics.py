@@ -23,6 +23,7 @@ from .replay import Incident, Replay
 
 OPEN_LOOP, ROBUST = "open loop", "robust"  # layers
 FORCE_WINDOW = 0.02  # s: forces are averaged over this time, so that an impact of 2 ms does not hide the rest
+LANDING = 0.003  # m, for a robot of ANYmal's size: a foot that lands or lifts off touches the ground from such a height on
 PATIENCE = 0.05  # s: a wrong contact or a saturated motor is an incident after this time
 SLIP_INCIDENT = 0.02  # m of slip in one stance
 SATURATED = 0.98  # fraction of the torque limit from which a motor counts as being at its limit
@@ -157,6 +158,16 @@ def _phases(planned: Bools) -> list[tuple[int, int, int]]:
     ]
 
 
+def _about_to_switch(reference: Reference, samples: int, distance: float) -> Bools:
+    """Swinging feet (K, E) that the plan has closer than `distance`, m, to where they stood or will stand: there they may touch the ground."""
+    near = np.zeros(reference.contact.shape, bool)
+    for e, first, end in _phases(reference.contact):
+        if not reference.contact[first, e]:
+            for place in (reference.foot[max(first - 1, 0), e], reference.foot[min(end, len(reference.t) - 1), e]):
+                near[first:end, e] |= np.linalg.norm(reference.foot[first:end, e] - place, axis=1) < distance
+    return near[:samples]
+
+
 def _worst_phase(t: Array, planned: Bools, values: Array, feet: tuple[str, ...]) -> _Worst:
     """The largest root mean square of values (K, E) in one stance or swing of a foot; the time is that of the largest value in it."""
     found = _Worst(0.0, None, None)
@@ -184,6 +195,7 @@ def judge_closed_loop(
     slid = since_start(planned, replay.slip)
     period, ones = float(reference.t[1]), np.ones(planned.shape)
     mismatch = replay.contact != planned
+    mistaken = mismatch & ~_about_to_switch(reference, K, LANDING * index.size)
     forces = filtered_forces(replay, reference)
     difference = forces.difference
     off_feet, off_net = np.linalg.norm(difference, axis=2) / mg, np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
@@ -204,7 +216,7 @@ def judge_closed_loop(
         _worst_phase(t, planned, 1e3 * apart, feet).metric(layer, criteria.FEET_WORST),
         slip.metric(layer, criteria.SLIP, 1e3 * float(replay.slip.sum()) / max(stances, 1)),
         slip.metric(layer, criteria.SLIP_WORST, 1e3 * slip.value),
-        wrong.metric(layer, criteria.CONTACT_MISMATCH, 100 * float(mismatch.mean())),
+        wrong.metric(layer, criteria.CONTACT_MISMATCH, 100 * float(mistaken.mean())),
         wrong.metric(layer, criteria.CONTACT_WORST, 1e3 * wrong.value),
         first_saturated.metric(layer, criteria.SATURATION, 100 * float(saturated.mean())),
         _worst(t, velocity / index.speed_limit, feet).metric(layer, criteria.REPLAY_SPEED),

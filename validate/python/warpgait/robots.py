@@ -100,8 +100,7 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
         box = geom_box(model, int(g))
         center, half = leg.plane @ box.center, np.abs(leg.plane) @ box.half_size
         corners = center + half * np.array(list(product([-1, 1], repeat=2)))
-        if (np.abs(center) <= half).all():  # around the axis; its far end counts as a corner
-            radius = max(radius, float(half[1]))
+        radius = max(radius, _around_axis(center, half))  # its far end counts as a corner
         furthest = corners[np.argmax(corners @ outward)]
         if furthest @ outward > corner[1]:
             corner = (float(furthest @ foot), float(furthest @ outward))
@@ -111,7 +110,18 @@ def shank_shape(model: Any, leg: Leg) -> ShankShape:
     for g in np.flatnonzero(model.geom_bodyid == model.body_parentid[body]):
         if np.hypot(*(leg.plane @ (model.geom_pos[g] - axis))) < KNEE_DISTANCE:
             radius = max(radius, float(model.geom_size[g][0]))
+        elif int(model.geom_type[g]) == int(mujoco.mjtGeom.mjGEOM_BOX):
+            box = geom_box(model, int(g))
+            radius = max(radius, _around_axis(leg.plane @ (box.center - axis), np.abs(leg.plane) @ box.half_size))
     return ShankShape(radius, corner, tube, tube_radius)
+
+
+def _around_axis(center: Array, half: Array) -> float:
+    """Radius of a ball around the last axis that stands for the part of a box there; from the axis, in the leg's plane (2,). 0 if the box is
+    elsewhere. A long box, as of a link, counts with its thickness."""
+    if (np.abs(center) > half + 1e-9).any():
+        return 0.0
+    return float(min(half[1], max(half[1] - abs(center[1]), half[0] + abs(center[0]))))
 
 
 def _tube(model: Any, leg: Leg, foot: Array, outward: Array) -> tuple[tuple[float, float], float]:
