@@ -13,7 +13,6 @@ or around a circle. The speed is 0.1 to 0.2 m/s for walks and 0.15 to 0.35 m/s f
 import argparse
 import json
 import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -185,19 +184,12 @@ def attempt(file: Path, program: str, replay: bool) -> str:
         return f"checks fail: {', '.join(failed)}"
     if not replay:
         return "solved"
-    command = [
-        sys.executable,
-        "-m",
-        "warpgait.validate",
-        str(plan),
-        "--no-files",
-        "--json",
-        "--quick",
-    ]
-    verdict = json.loads(
-        subprocess.run(command, capture_output=True, text=True, check=False).stdout
-    )["verdict"]
-    return f"replay: {verdict}"
+    validate = [program, "validate", str(plan), "--no-files", "--json", "--quick"]
+    replayed = subprocess.run(validate, capture_output=True, text=True, check=False)
+    if replayed.returncode > 1:
+        return f"not replayed: {replayed.stderr.strip().splitlines()[-1]}"
+    report = json.loads(replayed.stdout)
+    return f"replay {report['verdict']}: {report['first_failure']}"
 
 
 def main() -> None:
