@@ -22,7 +22,9 @@ pub struct DerivativeError {
 const STEP: f64 = 1e-5;
 /// Finer one, where the first cannot tell.
 const FINER_STEP: f64 = 1e-6;
-/// A derivative that disagrees by more than this is compared with finer differences too, a second one also with one-sided ones:
+/// Coarser one for second derivatives, where rounding is in the way of both.
+const COARSER_STEP: f64 = 1e-4;
+/// A derivative that disagrees by more than this is compared with other differences too, a second one also with one-sided ones:
 /// more than the step's own error, less than any test allows.
 const SUSPICIOUS: f64 = 1e-7;
 /// A difference larger than this, where the pattern has no entry, is a missing entry.
@@ -163,7 +165,7 @@ fn check_hessian(
             lagrangian(problem, &moved)
         };
         let mut nearest = vec![f64::INFINITY; n];
-        for step in [STEP, FINER_STEP] {
+        for step in [STEP, FINER_STEP, COARSER_STEP] {
             let [minus, plus] = [-step, step].map(&mut at);
             let central = |u: usize| (plus[u] - minus[u]) / (2.0 * step);
             if !approach(&column, &mut nearest, central) {
