@@ -50,8 +50,8 @@ def test_a_standing_robot_stays_level_under_a_load_that_tipped_it_before(standin
 def test_the_controller_finds_the_center_of_mass(standing_plan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     loop, controllers = loop_of(read_plan(standing_plan)), []
 
-    def keep(self: WholeBody, *arguments: Any, original: Any = WholeBody.__init__) -> None:
-        original(self, *arguments)
+    def keep(self: WholeBody, *arguments: Any, original: Any = WholeBody.__init__, **options: Any) -> None:
+        original(self, *arguments, **options)
         controllers.append(self)
 
     monkeypatch.setattr(WholeBody, "__init__", keep)
