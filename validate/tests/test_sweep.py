@@ -112,7 +112,9 @@ def test_time_and_memory_are_limited(folder: Path) -> None:
 def test_an_interruption_ends_the_processes_and_keeps_what_is_done(folder: Path) -> None:
     (folder / "s.toml").write_text('scenario = "walk.toml"\n[values]\nhorizon = [2.0, 200.0, 201.0, 202.0]\n')
     command = [sys.executable, "-P", "-m", "warpgait.commands.sweep", str(folder / "s.toml"), "--workers", "2"]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    # Where these tests run in the background of a shell, interruptions are ignored, which a process inherits.
+    heed: Any = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **heed)
     deadline = time.monotonic() + 60
     while not list((folder / "s.sweep/cases").glob("*.json")) and time.monotonic() < deadline:
         time.sleep(0.05)
