@@ -22,7 +22,7 @@ pub struct DerivativeError {
 const STEP: f64 = 1e-5;
 /// Finer one, where the first cannot tell.
 const FINER_STEP: f64 = 1e-6;
-/// Coarser one for second derivatives, where rounding is in the way of both.
+/// Coarser one for second derivatives, where rounding hides what the others could tell.
 const COARSER_STEP: f64 = 1e-4;
 /// A derivative that disagrees by more than this is compared with other differences too, a second one also with one-sided ones:
 /// more than the step's own error, less than any test allows.

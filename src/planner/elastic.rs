@@ -151,6 +151,8 @@ struct Elastic<'a> {
     sources: Vec<Source>,
     values: Vec<f64>,
     entries: Vec<f64>,
+    /// By row of the problem.
+    multipliers: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -222,7 +224,8 @@ impl<'a> Elastic<'a> {
             }
         }
         let entries = vec![0.0; entry_rows.len()];
-        Self { problem, rows, slacks, initial, jacobian, sources, values, entries }
+        let multipliers = vec![0.0; m];
+        Self { problem, rows, slacks, initial, jacobian, sources, values, entries, multipliers }
     }
 
     fn own(&self) -> usize {
@@ -305,11 +308,12 @@ impl NlpProblem for Elastic<'_> {
         out: &mut [f64],
     ) {
         let n = self.own();
-        let mut own = vec![0.0; self.values.len()];
+        let own = &mut self.multipliers;
+        own.fill(0.0);
         for (multiplier, row) in multipliers.iter().zip(&self.rows) {
             own[row.row] += multiplier;
         }
-        self.problem.hessian_values(&x[..n], new_x, COST * objective_factor, &own, new_multipliers, out);
+        self.problem.hessian_values(&x[..n], new_x, COST * objective_factor, own, new_multipliers, out);
     }
 }
 

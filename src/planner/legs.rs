@@ -388,7 +388,7 @@ impl<'a> BodyMotion<'a> {
     }
 }
 
-/// Larger turns are no vibration: a leg is where no joint angles lead. rad.
+/// A larger turn, rad, is not a vibration: some leg is out of reach.
 const LARGEST_TURN: f64 = 0.05;
 /// J hardly changes with the turns.
 const SETTLING_ROUNDS: usize = 2;

@@ -79,7 +79,7 @@ impl Search {
         let place = |n: usize| [grid.x(n % grid.columns), grid.y(n / grid.columns)];
         let standable: Vec<bool> = (0..grid.len()).map(|n| stands(place(n))).collect();
         let spacing = grid.spacing[0].max(grid.spacing[1]);
-        let within = |n: usize, reach: f64, mut f: Box<dyn FnMut(usize, f64) + '_>| {
+        let within = |n: usize, reach: f64, f: &mut dyn FnMut(usize, f64)| {
             let (column, row) = ((n % grid.columns) as isize, (n / grid.columns) as isize);
             let cells = (reach / spacing).ceil() as isize;
             for v in -cells..=cells {
@@ -99,15 +99,11 @@ impl Search {
             let [x, y] = place(n);
             let border = (x - x_min).min(x_max - x).min(y - y_min).min(y_max - y);
             let (mut near, mut all, mut closed) = (false, 0.0, 0.0);
-            within(
-                n,
-                (SURROUNDINGS * feet).max(WITHIN_REACH * half_size),
-                Box::new(|m, distance| {
-                    near |= standable[m] && distance <= WITHIN_REACH * half_size;
-                    all += 1.0;
-                    closed += f64::from(u8::from(!standable[m]));
-                }),
-            );
+            within(n, (SURROUNDINGS * feet).max(WITHIN_REACH * half_size), &mut |m, distance| {
+                near |= standable[m] && distance <= WITHIN_REACH * half_size;
+                all += 1.0;
+                closed += f64::from(u8::from(!standable[m]));
+            });
             open.push(near && border >= FROM_BORDER * feet);
             cost.push(1.0 + CROWDED * closed / all);
         }

@@ -23,7 +23,7 @@ from .replay import Incident, Replay
 
 OPEN_LOOP, ROBUST = "open loop", "robust"  # layers
 FORCE_WINDOW = 0.02  # s: forces are averaged over this time, so that an impact of 2 ms does not hide the rest
-LANDING = 0.003  # m, for a robot of ANYmal's size: a foot that lands or lifts off touches the ground from such a height on
+LANDING = 0.003  # m, for a robot of ANYmal's size: a foot this close to where it lands or lifts off may touch the ground
 PATIENCE = 0.05  # s: a wrong contact or a saturated motor is an incident after this time
 SLIP_INCIDENT = 0.02  # m of slip in one stance
 SATURATED = 0.98  # fraction of the torque limit from which a motor counts as being at its limit
@@ -159,7 +159,7 @@ def _phases(planned: Bools) -> list[tuple[int, int, int]]:
 
 
 def _about_to_switch(reference: Reference, samples: int, distance: float) -> Bools:
-    """Swinging feet (K, E) that the plan has closer than `distance`, m, to where they stood or will stand: there they may touch the ground."""
+    """Swinging feet (K, E) within `distance`, m, of where they stood or will stand by the plan: there they may touch the ground."""
     near = np.zeros(reference.contact.shape, bool)
     for e, first, end in _phases(reference.contact):
         if not reference.contact[first, e]:
