@@ -287,7 +287,9 @@ def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
     else:
         found = stances.of_key(skeleton)
         if found is not None and not stances.stands(skeleton.legs, found):
-            skeleton.notes.append("the keyframe is not a stance, because not all of its feet are well below the hips; a stance is computed instead")
+            skeleton.notes.append(
+                "the keyframe is not a stance, because not all of its feet are well below the hips; a stance is computed instead"
+            )
             found = None
         source, q = ("keyframe", found) if found is not None else ("computed", stances.computed(skeleton.legs))
     stances.judge(skeleton, q, source)
