@@ -82,7 +82,7 @@ def write(folder: Path, kind: str, seed: int, robot: str) -> Path:
     return file
 
 
-def attempt(file: Path, program: str, formulation: str) -> str:
+def attempt(file: Path, program: str, formulation: str, replay_options: list[str]) -> str:
     """Solves, checks and replays one scenario; returns pass, marginal, fail, or what went wrong before the replay."""
     plan = file.with_suffix(".plan.npz")
     solve = [program, "solve", str(file), "-o", str(plan), "--formulation", formulation, "--no-plot", "--json"]
@@ -91,7 +91,7 @@ def attempt(file: Path, program: str, formulation: str) -> str:
         return f"refused: {solved.stderr.strip().splitlines()[-1]}"
     if solved.returncode != 0:
         return "not solved, or a check fails"
-    replay = [sys.executable, "-m", "warpgait.commands.validate", str(plan), "--no-files", "--json"]
+    replay = [sys.executable, "-m", "warpgait.commands.validate", str(plan), "--no-files", "--json", *replay_options]
     return str(json.loads(subprocess.run(replay, capture_output=True, text=True, check=False).stdout)["verdict"])
 
 
@@ -103,6 +103,7 @@ def main() -> None:
     parser.add_argument("--robot", default="anymal_c")
     parser.add_argument("--formulation", default="hybrid")
     parser.add_argument("--run", action="store_true", help="solve, check and replay")
+    parser.add_argument("--no-robust", action="store_true", help="replay without the worlds that differ from the plan's")
     parser.add_argument("--program", default="target/release/warpgait", help="warpgait")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -113,7 +114,7 @@ def main() -> None:
         for seed in range(*options.seeds):
             file = write(options.out, kind, seed, options.robot)
             if options.run:
-                ended = attempt(file, options.program, options.formulation)
+                ended = attempt(file, options.program, options.formulation, ["--no-robust"] * options.no_robust)
                 print(f"{file.stem}: {ended}", flush=True)
                 counts[ended.split(":")[0]] = counts.get(ended.split(":")[0], 0) + 1
     if options.run:
