@@ -165,7 +165,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
         scenario: loaded.effective_text.clone(),
         scenario_source: loaded.source_text.clone(),
         overrides: loaded.overrides.clone(),
-        robot: meta_robot(model, loaded),
+        robot: MetaRobot::of(model, loaded),
         limits: Some(limits(scenario)),
         solver: MetaSolver {
             status: motion.status.clone(),
@@ -186,19 +186,22 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
     }
 }
 
-fn meta_robot(model: &Model, loaded: &LoadedScenario) -> MetaRobot {
-    let robot = &loaded.robot;
-    MetaRobot {
-        name: robot.name.clone(),
-        mass: robot.mass,
-        inertia: robot.inertia,
-        friction: loaded.scenario.contact.friction,
-        gravity: [0.0, 0.0, -GRAVITY],
-        reach: model.reach.clone(),
-        torso: robot.torso,
-        foot_radius: robot.foot_radius(),
-        legs: MetaRobot::legs_of(robot, &loaded.scenario),
-        nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
+impl MetaRobot {
+    /// The robot of a scenario, as its plan names it.
+    pub fn of(model: &Model, loaded: &LoadedScenario) -> Self {
+        let robot = &loaded.robot;
+        Self {
+            name: robot.name.clone(),
+            mass: robot.mass,
+            inertia: robot.inertia,
+            friction: loaded.scenario.contact.friction,
+            gravity: [0.0, 0.0, -GRAVITY],
+            reach: model.reach.clone(),
+            torso: robot.torso,
+            foot_radius: robot.foot_radius(),
+            legs: Self::legs_of(robot, &loaded.scenario),
+            nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
+        }
     }
 }
 

@@ -16,6 +16,7 @@
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | `friction_margin` | the same, and what a smaller margin of friction would do |
 //! | `elastic`, `why` | when no motion is found: which limits would have to give |
+//! | [`iterate`] | the motion at an iteration, for those who watch |
 //! | [`stage`] | which stages there are |
 //! | `stopping` | when a stage has done what its effort demands |
 //! | `options` | the options given to Ipopt |
@@ -31,6 +32,7 @@ mod foothold_search;
 mod footholds;
 mod friction_margin;
 pub mod guess;
+pub mod iterate;
 pub mod legs;
 pub mod motion;
 mod options;
@@ -51,6 +53,7 @@ mod why;
 
 pub use elastic::{Explanation, Shortfall};
 pub use friction_margin::solve;
+pub use iterate::{Iterate, IterateSamples};
 pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;

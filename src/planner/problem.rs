@@ -27,6 +27,8 @@ use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::{Multipliers, NlpProblem};
 use crate::scenario::{Cone, Law, PostureSpec, Scenario};
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::threads::ThreadSplit;
@@ -51,7 +53,7 @@ const FORCE_SHARE_WEIGHT: f64 = 0.5;
 /// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper: Eq. 1 in the direct formulation, Eq. 7 in the warped one.
 pub struct GaitProblem {
     /// What stays the same.
-    pub model: Model,
+    pub model: Arc<Model>,
     /// The nodes at the last x.
     pub state: State,
     blocks: Vec<Box<dyn Constraint>>,
@@ -181,7 +183,7 @@ impl GaitProblem {
             evaluated: initial.clone(),
             curved: exact_hessian,
             jacobian_split: ThreadSplit::new(&jacobian, 0..blocks.len(), model.threads),
-            model,
+            model: Arc::new(model),
             state,
             blocks,
             offsets,

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::base_path::BasePath;
 use super::elastic::{self, Explanation};
 use super::guess;
+use super::iterate::Iterate;
 use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
 use super::options;
@@ -94,6 +95,8 @@ pub struct Progress<'a> {
     pub iteration: usize,
     /// The iteration as Ipopt reports it.
     pub record: &'a IterationRecord,
+    /// The motion there, for those who watch; none while limits give.
+    pub iterate: Option<Iterate<'a>>,
 }
 
 /// What a solve needs from its caller while it runs.
@@ -328,7 +331,7 @@ impl<'a> Solve<'a> {
                 );
                 break;
             }
-            let mut model = end.problem.model.clone();
+            let mut model = (*end.problem.model).clone();
             model.leg_terms = terms;
             let start = Start::Warm(end.multipliers, end.mu);
             let status = end.status;
@@ -387,7 +390,7 @@ impl<'a> Solve<'a> {
         let rule_effort = if matches!(stage, Stage::LegMass { .. }) { Effort::Feasible } else { effort };
         let mut rule = StoppingRule::new(rule_effort, with_costs, tolerance);
         let mut stopped = false;
-        let (history, host) = (&mut self.history, &mut *self.host);
+        let (history, host, model) = (&mut self.history, &mut *self.host, problem.model.clone());
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
         let solution = ipopt::solve(&mut problem, &options, &mut |record, x| {
             let iteration = record.iteration + before;
@@ -400,7 +403,8 @@ impl<'a> Solve<'a> {
                 }
                 _ => {
                     history.push(row);
-                    if host.on_iteration(&Progress { stage, iteration, record }).is_break() {
+                    let iterate = Some(Iterate { model: &model, x });
+                    if host.on_iteration(&Progress { stage, iteration, record, iterate }).is_break() {
                         stopped = true;
                         return ControlFlow::Break(());
                     }
@@ -445,7 +449,7 @@ impl<'a> Solve<'a> {
         let (host, before, mut stopped) = (&mut *self.host, self.iterations, false);
         let explanation = elastic::explain(&mut problem, &x, solver, limit, &mut |record| {
             let iteration = before + record.iteration;
-            let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record });
+            let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record, iterate: None });
             stopped = flow.is_break();
             flow
         });
@@ -458,19 +462,20 @@ impl<'a> Solve<'a> {
         let violations = violation::table(&mut end.problem, &end.x);
         self.seconds.total = self.start.elapsed().as_secs_f64();
         // Plans are sampled from the motion as it is, at the switches that were found.
-        end.problem.model.layout.freeze(&end.x);
-        let settled = BodyMotion::new(&end.problem.model, &end.x, FINE).and_then(|body| body.settled(&end.x));
+        let mut model = Arc::unwrap_or_clone(end.problem.model);
+        model.layout.freeze(&end.x);
+        let settled = BodyMotion::new(&model, &end.x, FINE).and_then(|body| body.settled(&end.x));
         if let Some((layout, x)) = settled {
-            (end.problem.model.layout, end.x) = (layout, x);
+            (model.layout, end.x) = (layout, x);
         }
-        let legs = BodyMotion::new(&end.problem.model, &end.x, FINE).map(|body| body.samples());
+        let legs = BodyMotion::new(&model, &end.x, FINE).map(|body| body.samples());
         Motion {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,
             status: end.status,
             explanation,
             legs,
-            model: end.problem.model,
+            model,
             x: end.x,
             iterations: self.iterations,
             violations,

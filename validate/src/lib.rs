@@ -7,6 +7,7 @@ mod arrays;
 mod check;
 mod command;
 mod error;
+mod iterate;
 mod scenario;
 mod solve;
 mod terrain;
@@ -23,6 +24,8 @@ mod _native {
     use super::check::check_plan;
     #[pymodule_export]
     use super::command::run_command;
+    #[pymodule_export]
+    use super::iterate::Iterate;
     #[pymodule_export]
     use super::scenario::{schema, terrain};
     #[pymodule_export]

@@ -97,7 +97,7 @@ def test_bad_values_are_refused_with_their_key(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="horizon: nan"):
         Scenario(horizon=float("nan"))
     with pytest.raises(InputError, match=r"start\.position: .*object"):
-        Scenario(start=object())
+        Scenario(start=object())  # type: ignore[arg-type]
     with pytest.raises(InputError, match="either a name or a file"):
         Scenario(robot=Robot())
     with pytest.raises(InputError, match="cannot be read as a scenario"):

@@ -234,29 +234,24 @@ def test_a_damaged_map_is_refused(warped_plan: Path, tmp_path: Path, capsys: pyt
 CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
 
 
+def command(folder: Path) -> list[str]:
+    """Chromium without a window, which draws in software; its console goes to standard error."""
+    options = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    return [str(CHROMIUM), *options, f"--user-data-dir={folder / 'profile'}", "--enable-logging=stderr"]
+
+
+def chromium(folder: Path, address: str, *options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*command(folder), *options, address], capture_output=True, text=True, timeout=120, check=True)
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 @pytest.mark.parametrize("size", ["1200,800", "390,844"])
 def test_chromium_shows_the_page_without_an_error(page: str, warped_plan: Path, tmp_path: Path, size: str) -> None:
     picture = tmp_path / "page.png"
-    command = [
-        str(CHROMIUM),
-        "--headless=new",
-        "--no-sandbox",
-        "--use-gl=angle",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-    ]
-    command += [
-        f"--user-data-dir={tmp_path / 'profile'}",
-        f"--window-size={size}",
-        "--virtual-time-budget=3000",
-        "--enable-logging=stderr",
-    ]
+    options = [f"--window-size={size}", "--virtual-time-budget=3000"]
     address = f"{warped_plan.with_name('walk.html').as_uri()}#1.5"
-    shown = subprocess.run(
-        [*command, f"--screenshot={picture}", address], capture_output=True, text=True, timeout=120, check=True
-    )
+    shown = chromium(tmp_path, address, *options, f"--screenshot={picture}")
     assert "CONSOLE" not in shown.stderr, shown.stderr
     assert picture.stat().st_size > 60_000  # an empty page takes 10 kB
-    dumped = subprocess.run([*command, "--dump-dom", address], capture_output=True, text=True, timeout=120, check=True).stdout
+    dumped = chromium(tmp_path, address, *options, "--dump-dom").stdout
     assert "1.50 / 3.00 s" in dumped and "Every law of the check holds." in dumped and 'id="problem" hidden' in dumped

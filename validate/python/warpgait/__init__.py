@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._native import BaseMotion, FeetMotion
+    from ._native import BaseMotion, FeetMotion, Iterate
     from .errors import InputError
     from .ground import write_terrain
     from .plans import Check, Plan, Report, check, load, solve, sweep, validate
@@ -28,6 +28,7 @@ _PLACES = {
     "Check": "plans",
     "FeetMotion": "_native",
     "InputError": "errors",
+    "Iterate": "_native",
     "Plan": "plans",
     "Report": "plans",
     "Robot": "scenario",
@@ -55,6 +56,7 @@ __all__ = [
     "Dataset",
     "FeetMotion",
     "InputError",
+    "Iterate",
     "Plan",
     "Report",
     "Robot",

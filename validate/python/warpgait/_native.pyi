@@ -71,6 +71,81 @@ class FeetMotion:
         """(…, E, 3) unit normal of the terrain under the foot."""
 
 @final
+class Iterate:
+    """The motion at an iteration, at N equally spaced times: 25 a second, but at most 500. E feet. World frame, SI units."""
+
+    @property
+    def stage(self) -> str:
+        """What is being solved, in words."""
+
+    @property
+    def iteration(self) -> int:
+        """Counted over all stages."""
+
+    @property
+    def violation(self) -> float:
+        """How far the constraints are violated at most."""
+
+    @property
+    def objective(self) -> float:
+        """The objective."""
+
+    @property
+    def t(self) -> npt.NDArray[np.float64]:
+        """(N,) s."""
+
+    @property
+    def base_position(self) -> npt.NDArray[np.float64]:
+        """(N, 3) center of mass, m."""
+
+    @property
+    def base_quaternion_wxyz(self) -> npt.NDArray[np.float64]:
+        """(N, 4) body to world."""
+
+    @property
+    def foot_position(self) -> npt.NDArray[np.float64]:
+        """(N, E, 3) contact points, m."""
+
+    @property
+    def foot_force(self) -> npt.NDArray[np.float64]:
+        """(N, E, 3) of the ground on the robot, N."""
+
+    @property
+    def foot_contact(self) -> npt.NDArray[np.bool_]:
+        """(N, E) in stance."""
+
+    @property
+    def warped_base(self) -> npt.NDArray[np.float64] | None:
+        """(N, 6) x, y, z, roll, pitch, yaw of the base in the warped space, m and rad, if it is planned there."""
+
+    @property
+    def warped_foot_position(self) -> npt.NDArray[np.float64] | None:
+        """(N, E, 3) contact points in the warped space, m, if they are planned there."""
+
+    @property
+    def warped_foot_force(self) -> npt.NDArray[np.float64] | None:
+        """(N, E, 3) forces in the warped space, N, if they are planned there."""
+
+    @property
+    def terrain(self) -> Terrain:
+        """The ground of this stage, which a continuation raises step by step."""
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """The E feet in order."""
+
+    @property
+    def robot(self) -> str:
+        """The robot, as JSON; `meta["robot"]` of the plan."""
+
+    @property
+    def warped_box(self) -> tuple[list[float], list[float]] | None:
+        """The corners of the map's box in the warped space, each (3,) m; none without a map."""
+
+    def ambient(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Points (…, 3) m of the warped space in ambient space. Without a map they are the same."""
+
+@final
 class Terrain:
     """The ground of a plan or a scenario: a C² spline through the heights, extended beyond their rectangle."""
 
@@ -157,11 +232,12 @@ def solve(
     *,
     overrides: dict[str, Any] | None = None,
     progress: Callable[[int, float, float], object] | None = None,
+    watch: Callable[[Iterate], object] | None = None,
 ) -> Trajectory:
     """Plan the motion of a scenario and check it, as `warpgait solve` does.
 
     `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
     `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
-    iteration of the nonlinear program. An exception that it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run
-    meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
+    iteration of the nonlinear program, and `watch(iterate)` at most ten times a second with an `Iterate`, the motion so far. An exception that
+    they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
     """

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._native import BaseMotion, FeetMotion
+from ._native import BaseMotion, FeetMotion, Iterate
 from .errors import InputError
 from .files import ensure_outputs
 from .scenario import Scenario
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .validation import Validation
 
 Progress = Callable[[int, float, float], object]
+Watch = Callable[[Iterate], object]
 
 
 class Plan:
@@ -305,18 +306,22 @@ def load(path: str | PathLike[str]) -> Plan:
 
 
 def solve(
-    scenario: Scenario | str | PathLike[str], *, overrides: dict[str, Any] | None = None, progress: Progress | None = None
+    scenario: Scenario | str | PathLike[str],
+    *,
+    overrides: dict[str, Any] | None = None,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Plan:
     """Plan the motion of a scenario and check it, as `warpgait solve` does.
 
     `scenario` is a `Scenario`, a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
     `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
-    iteration of the nonlinear program. An exception that it raises ends the solve and is raised here, and so is Ctrl-C. Other threads run
-    meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
+    iteration of the nonlinear program, and `watch(iterate)` at most ten times a second with an `Iterate`, the motion so far. An exception that
+    they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
     """
     if isinstance(scenario, Scenario):
-        return (scenario.set(overrides) if overrides else scenario).solve(progress)
-    return Plan(_native.solve(scenario, overrides=overrides, progress=progress))
+        return (scenario.set(overrides) if overrides else scenario).solve(progress, watch)
+    return Plan(_native.solve(scenario, overrides=overrides, progress=progress, watch=watch))
 
 
 def validate(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from . import _native
 from .errors import InputError
@@ -18,6 +18,7 @@ from .toml import table_text
 
 if TYPE_CHECKING:
     from .plans import Plan
+    from .scenario_types import ScenarioTables
 
 _MOST_TEXT = 1 << 20  # bytes of a scenario file that is read
 
@@ -62,10 +63,10 @@ class Scenario:
 
     `Scenario(terrain=Terrain.shape("rippled"), robot="anymal_c", start=(0, 0), goal=(1, 0), gait="trot", horizon=10.0)` has the tables of a
     scenario file as keyword arguments: dicts, `Terrain` and `Robot`, or for `robot` a name, for `gait` a kind, for `start` and `goal` a
-    position (2,) in m. `Scenario.read` takes a file, and `Scenario.from_text` TOML.
+    position (2,) in m; `warpgait.scenario_types` has their types. `Scenario.read` takes a file, and `Scenario.from_text` TOML.
     """
 
-    def __init__(self, **tables: Any) -> None:
+    def __init__(self, **tables: Unpack[ScenarioTables]) -> None:
         """Values are judged when the scenario is solved; here only whether TOML has such values."""
         values = {"schema": 1} | {key: _table(key, value) for key, value in tables.items()}
         self._kept = [value for value in tables.values() if isinstance(value, Terrain)]
@@ -164,12 +165,16 @@ class Scenario:
         source = self._path if self._path is not None else self._text
         return Terrain(values, _known=_native.terrain(source, overrides=self._overrides or None))
 
-    def solve(self, progress: Callable[[int, float, float], object] | None = None) -> Plan:
+    def solve(
+        self,
+        progress: Callable[[int, float, float], object] | None = None,
+        watch: Callable[[_native.Iterate], object] | None = None,
+    ) -> Plan:
         """Plan the motion, as `warpgait solve` does; see `warpgait.solve`."""
         from .plans import Plan
 
         source = self._path if self._path is not None else self._text
-        return Plan(_native.solve(source, overrides=self._overrides or None, progress=progress))
+        return Plan(_native.solve(source, overrides=self._overrides or None, progress=progress, watch=watch))
 
     def __repr__(self) -> str:
         """Where it is from, and what was changed."""

@@ -1,6 +1,8 @@
 """`warpgait view P.plan.npz`: a page of the plan, to look at and to send to others; it needs no network.
 
-Exit code 0: written; 2: bad input, something needed is missing, or a file or standard output cannot be written.
+With `--live`, the file is a scenario: it is planned, and the page shows the iterates as they come, then the plan.
+
+Exit code 0: written; 1: with `--live`, the plan is not solved or fails a check; 2: bad input, something needed is missing, or a file or standard output cannot be written.
 """
 
 from __future__ import annotations
@@ -26,13 +28,25 @@ def _parser() -> argparse.ArgumentParser:
         prog="warpgait view",
         description="Writes a page of a plan, and of its replay if that lies beside it, and opens it in the browser.",
     )
-    parser.add_argument("plan", type=Path, help="NAME.plan.npz")
+    parser.add_argument("plan", type=Path, help="NAME.plan.npz; with --live NAME.toml")
     parser.add_argument(
         "--html",
         type=Path,
         metavar="OUT.html",
         help="write this file, and open nothing (default: NAME.view.html beside the plan, opened)",
     )
+    planning = parser.add_argument_group("while a scenario is planned")
+    planning.add_argument(
+        "--live", action="store_true", help="the file is a scenario: plan it, and show the iterates as they come"
+    )
+    planning.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a value of the scenario")
+    planning.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the plan to write (default: NAME.plan.npz in the working folder)"
+    )
+    planning.add_argument(
+        "--port", type=int, default=0, help="of the address that is served to this machine only (default: one that is free)"
+    )
+    planning.add_argument("--no-browser", action="store_true", help="open nothing, only print the address")
     parser.add_argument("--json", action="store_true", help="print the path as JSON")
     parser.add_argument("-q", "--quiet", action="store_true", help="print errors only")
     return parser
@@ -54,22 +68,31 @@ def write_page(plan: Path, target: Path) -> None:
     write_text(target, page_text(plan))
 
 
-def opened(page: Path) -> bool:
-    """Open a page in the browser, if there is one; programs are not looked for in the working folder."""
+def opened(address: str) -> bool:
+    """Open an address in the browser, if there is one; programs are not looked for in the working folder."""
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in (*_DISPLAYS, "BROWSER")):
         return False
     folders = os.environ.get("PATH", "").split(os.pathsep)
     os.environ["PATH"] = os.pathsep.join(folder for folder in folders if os.path.isabs(folder))
     try:
-        return webbrowser.open(page.resolve().as_uri())
+        return webbrowser.open(address)
     except (webbrowser.Error, OSError):
         return False
 
 
 def _main(options: argparse.Namespace) -> int:
+    if options.live:
+        from .live import live
+
+        code, written = live(options)
+        if options.json:
+            emit(json.dumps(written))
+        return code
+    if options.set or options.output or options.port or options.no_browser:
+        raise InputError("--set, --output, --port and --no-browser are for --live")
     target = options.html or options.plan.with_name(f"{stem_of(options.plan)}.view.html")
     write_page(options.plan, target)
-    shown = options.html is None and opened(target)
+    shown = options.html is None and opened(target.resolve().as_uri())
     if options.json:
         emit(json.dumps({"written": str(target), "opened": shown}))
     elif not options.quiet:

@@ -25,16 +25,22 @@ def _subtitle(scene: dict[str, Any]) -> str:
 
 
 def page_of(path: Path) -> str:
-    """The page as text; raises `InputError` for a plan that cannot be read."""
+    """The page of a plan as text; raises `InputError` for a plan that cannot be read."""
     scene = scene_of(path)
+    return page_of_scene(scene, f"{scene['name']}: a walk by warpgait", _subtitle(scene))
+
+
+def page_of_scene(scene: dict[str, Any], title: str, subtitle: str, sources: str = "") -> str:
+    """The page that shows a scene. `sources` is what it may load from, in the words of its content security policy."""
     # No text of the plan can end the element that holds it.
     data = json.dumps(scene, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
-        "title": escape(f"{scene['name']}: a walk by warpgait"),
-        "subtitle": escape(_subtitle(scene)),
+        "title": escape(title),
+        "subtitle": escape(subtitle),
+        "sources": sources,
         "style": _asset("style.css"),
         "warped": _WARPED if scene["map"] else "",
         "script": "\n".join(_asset(name) for name in _SCRIPTS),
         "data": data,
     }
-    return re.sub(r"\{(title|subtitle|style|warped|script|data)\}", lambda found: parts[found[1]], _asset("page.html"))
+    return re.sub(r"\{(title|subtitle|sources|style|warped|script|data)\}", lambda found: parts[found[1]], _asset("page.html"))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from ..archive import Archive
-from ..arrays import Array, runs
+from ..arrays import Array, Bools, runs
 from ..criteria import LEVER
 from ..errors import InputError
 from ..files import stem_of
@@ -23,9 +23,9 @@ from ..plan import Heightfield, Plan, read_plan
 from .warping import Warping, grid, warping_of
 
 RATE = 50.0  # Hz; the page interpolates
-_FEET = ("#c8352c", "#2166ac", "#e08214", "#1b8a5a", "#7b3fa0", "#6b6b6b")  # as in src/report/color.rs
-_MOST_NODES = 240  # of the ground along each axis
-_AROUND = 1.5  # m of ground around the way
+_COLORS = ("#c8352c", "#2166ac", "#e08214", "#1b8a5a", "#7b3fa0", "#6b6b6b")  # as in src/report/color.rs
+MOST_NODES = 240  # of the ground along each axis
+AROUND = 1.5  # m of ground around the way
 _STEPS = 65535  # of heights
 _THIN = 1e-3  # m, the least half size of a box
 _ROBOT_COLOR = (0.75, 0.14, 0.12, 1.0)
@@ -93,17 +93,28 @@ def _ground(archive: Archive, plan: Plan, motion: Motion) -> dict[str, Any]:
     x_y = np.concatenate([motion.center_of_mass[:, :2], motion.foot_position[..., :2].reshape(-1, 2)])
     terrain = plan.terrain
     limits = [int(n) - 1 for n in terrain.heights.shape[::-1]]
-    first = np.clip(np.floor((x_y.min(0) - _AROUND - terrain.origin) / terrain.spacing).astype(int), 0, limits)
-    last = np.clip(np.ceil((x_y.max(0) + _AROUND - terrain.origin) / terrain.spacing).astype(int), 0, limits)
+    first = np.clip(np.floor((x_y.min(0) - AROUND - terrain.origin) / terrain.spacing).astype(int), 0, limits)
+    last = np.clip(np.ceil((x_y.max(0) + AROUND - terrain.origin) / terrain.spacing).astype(int), 0, limits)
     last = np.maximum(last, np.minimum(first + 1, limits))
     first = np.minimum(first, last - 1)
-    thin = np.maximum(1, np.ceil((last - first + 1) / _MOST_NODES).astype(int))
+    thin = np.maximum(1, np.ceil((last - first + 1) / MOST_NODES).astype(int))
     window = slice(first[1], last[1] + 1, thin[1]), slice(first[0], last[0] + 1, thin[0])
     other, label = plan.terrain_raw, "raw ground"
     if "patch_corners" in archive and "heightfield_raw" in archive:  # planned for the raw ground
         other, label = Heightfield(archive["heightfield"], terrain.origin, terrain.spacing), "smoothed ground"
-    heights = terrain.heights[window]
-    others = None if other is None else other.heights[window]
+    unknown = None
+    if "heightfield_unknown" in archive:
+        flags = archive["heightfield_unknown"]
+        if flags.shape != terrain.heights.shape or flags.dtype != np.bool_:
+            raise InputError(f"{plan.path}: member heightfield_unknown: expected {terrain.heights.shape} of true or false")
+        unknown = packed(flags[window])
+    origin, spacing = terrain.origin + first * terrain.spacing, terrain.spacing * thin
+    shown = ground(terrain.heights[window], origin, spacing, None if other is None else other.heights[window])
+    return shown | {"raw_label": label, "unknown": unknown}
+
+
+def ground(heights: Array, origin: Array, spacing: Array, others: Array | None = None) -> dict[str, Any]:
+    """Heights (rows along y, columns along x) m of a grid for the page; `others` are those of another surface."""
     every = heights if others is None else np.concatenate([heights, others])
     low, high = float(every.min()), float(every.max())
     rise = max(high - low, 1e-6)
@@ -111,42 +122,42 @@ def _ground(archive: Archive, plan: Plan, motion: Motion) -> dict[str, Any]:
     def steps(values: Array) -> dict[str, str]:
         return packed(np.rint((values - low) / rise * _STEPS).astype("<u2"))
 
-    unknown = None
-    if "heightfield_unknown" in archive:
-        flags = archive["heightfield_unknown"]
-        if flags.shape != terrain.heights.shape or flags.dtype != np.bool_:
-            raise InputError(f"{plan.path}: member heightfield_unknown: expected {terrain.heights.shape} of true or false")
-        unknown = packed(flags[window])
     return {
         "rows": heights.shape[0],
         "columns": heights.shape[1],
-        "origin": (terrain.origin + first * terrain.spacing).tolist(),
-        "spacing": (terrain.spacing * thin).tolist(),
+        "origin": origin.tolist(),
+        "spacing": spacing.tolist(),
         "low": low,
         "high": low + rise,
         "heights": steps(heights),
         "raw": None if others is None else steps(others),
-        "raw_label": label,
+        "raw_label": "",
         "raw_first": False,
-        "unknown": unknown,
+        "unknown": None,
     }
 
 
-def _footholds(plan: Plan) -> list[dict[str, Any]]:
+def footholds(t: Array, contact: Bools, position: Array, normal: Array) -> list[dict[str, Any]]:
+    """Where feet stand, and when: from times (N,), contacts (N, E), places and normals of the ground (N, E, 3)."""
     holds = []
-    for e in range(len(plan.foot_names)):
-        for first, end in runs(plan.foot_contact[:, e]):
+    for e in range(contact.shape[1]):
+        for first, end in runs(contact[:, e]):
             middle = (first + end) // 2
             holds.append(
                 {
                     "foot": e,
-                    "start": float(plan.t[first]),
-                    "end": float(plan.t[end - 1]),
-                    "place": plan.foot_position[middle, e].tolist(),
-                    "normal": plan.foot_normal[middle, e].tolist(),
+                    "start": float(t[first]),
+                    "end": float(t[end - 1]),
+                    "place": position[middle, e].tolist(),
+                    "normal": normal[middle, e].tolist(),
                 }
             )
     return holds
+
+
+def feet(names: tuple[str, ...]) -> list[dict[str, str]]:
+    """Names and colors."""
+    return [{"name": name, "color": _COLORS[e % len(_COLORS)]} for e, name in enumerate(names)]
 
 
 def _patches(archive: Archive) -> list[dict[str, Any]]:
@@ -178,26 +189,38 @@ def _warped(archive: Archive, plan: Plan, warping: Warping, at: npt.NDArray[np.i
     base, turns = plan.base_position[at], plan.base_quaternion_wxyz[at]
     if has_base:
         base = member("warped_base_position", (N, 3))[at]
-        # z, y, x: yaw about z, then pitch, then roll.
-        euler = member("warped_base_euler", (N, 3))[at]
-        turns = np.roll(Rotation.from_euler("ZYX", euler[:, ::-1]).as_quat(), 1, axis=-1)
-    lines = grid(warping, np.concatenate([base, feet.reshape(-1, 3)]))
+        turns = turns_of(member("warped_base_euler", (N, 3))[at])
+    drawn = warped_space(warping, np.concatenate([base, feet.reshape(-1, 3)])) | {"has_base": has_base}
+    return drawn, box_motion(base, turns, feet, force, np.broadcast_to([0.0, 0.0, 1.0], feet.shape), plan.foot_contact[at])
+
+
+def turns_of(euler: Array) -> Array:
+    """Quaternions (N, 4), scalar first, of roll, pitch and yaw (N, 3): yaw about z, then pitch, then roll."""
+    turns: Array = np.roll(Rotation.from_euler("ZYX", euler[:, ::-1]).as_quat(), 1, axis=-1)
+    return turns
+
+
+def warped_space(warping: Warping, around: Array) -> dict[str, Any]:
+    """The map's grid in both spaces, near points (N, 3) of the warped one."""
+    lines = grid(warping, around)
     low, high = warping.lower[:2], warping.upper[:2]
-    drawn = {
+    return {
         "straight": [packed(line) for line in lines],
         "lines": [packed(warping(line)) for line in lines],
         "extent": [float(low[0]), float(high[0]), float(low[1]), float(high[1])],
-        "has_base": has_base,
     }
-    motion = {
+
+
+def box_motion(base: Array, turns: Array, touch: Array, force: Array, normal: Array, contact: Bools) -> dict[str, Any]:
+    """A motion of the base (N, 3) and (N, 4) and of the feet (N, E, 3), without links."""
+    return {
         "bodies": packed(np.hstack([base, turns])),
         "center": packed(base),
-        "touch": packed(feet),
+        "touch": packed(touch),
         "force": packed(force),
-        "normal": packed(np.broadcast_to([0.0, 0.0, 1.0], feet.shape)),
-        "contact": packed(plan.foot_contact[at]),
+        "normal": packed(normal),
+        "contact": packed(contact),
     }
-    return drawn, motion
 
 
 def _worst(values: Array, at: npt.NDArray[np.intp]) -> Array:
@@ -287,9 +310,9 @@ def _replayed(plan: Plan) -> tuple[Motion | None, str]:
         return None, f"The replay is not shown: {error}"
 
 
-def _torso(plan: Plan) -> dict[str, list[float]]:
-    """Center and half size of the trunk's box, from the center of mass."""
-    torso = plan.meta["robot"].get("torso") or {}
+def torso_of(robot: dict[str, Any]) -> dict[str, list[float]]:
+    """Center and half size of the trunk's box, from the center of mass; `robot` is that of a plan's `meta`."""
+    torso = robot.get("torso") or {}
     try:
         center, half = (np.array(torso[key], float).reshape(3) for key in ("center", "half_size"))
     except (KeyError, TypeError, ValueError):
@@ -297,9 +320,13 @@ def _torso(plan: Plan) -> dict[str, list[float]]:
     return {"center": center.tolist(), "half": half.tolist()}
 
 
-def _box_robot(plan: Plan) -> tuple[list[dict[str, Any]], list[list[float]]]:
-    """A robot without joints: a box, and where the lines to its feet begin, in the base frame."""
-    torso = _torso(plan)
+def box_robot(
+    torso: dict[str, list[float]], base: Array, turn: Array, foot_position: Array
+) -> tuple[list[dict[str, Any]], list[list[float]]]:
+    """A robot without links: a box, and where the lines to its feet begin, in the base frame.
+
+    `base` (3,), `turn` (4,) and `foot_position` (E, 3) are those at the start.
+    """
     box = {
         "kind": "box",
         "place": torso["center"],
@@ -307,9 +334,7 @@ def _box_robot(plan: Plan) -> tuple[list[dict[str, Any]], list[list[float]]]:
         "size": torso["half"],
         "color": list(_ROBOT_COLOR),
     }
-    first = (
-        Rotation.from_quat(np.roll(plan.base_quaternion_wxyz[0], -1)).inv().apply(plan.foot_position[0] - plan.base_position[0])
-    )
+    first = Rotation.from_quat(np.roll(turn, -1)).inv().apply(foot_position - base)
     corner = np.clip(first - torso["center"], -np.array(torso["half"]), torso["half"]) + torso["center"]
     corner[:, 2] = torso["center"][2]
     return [{"name": "base", "shapes": [box]}], corner.tolist()
@@ -327,7 +352,11 @@ def _scene_of(plan: Plan) -> dict[str, Any]:
     motion = motion_of_plan(plan, RATE)
     replayed, note = _replayed(plan)
     at = np.clip(np.rint(motion.t / plan.t[1]).astype(np.intp), 0, len(plan.t) - 1)
-    bodies, legs = (_shapes(motion), None) if motion.body_names else _box_robot(plan)
+    torso = torso_of(plan.meta["robot"])
+    if motion.body_names:
+        bodies, legs = _shapes(motion), None
+    else:
+        bodies, legs = box_robot(torso, plan.base_position[0], plan.base_quaternion_wxyz[0], plan.foot_position[0])
     warping = warping_of(archive, plan)
     drawn, warped = (None, None) if warping is None else _warped(archive, plan, warping, at)
     laws, metrics = _laws(plan), _replay_metrics(plan)
@@ -340,17 +369,17 @@ def _scene_of(plan: Plan) -> dict[str, Any]:
         "duration": motion.duration,
         "rate": RATE,
         "frames": len(motion.t),
-        "feet": [{"name": name, "color": _FEET[e % len(_FEET)]} for e, name in enumerate(plan.foot_names)],
+        "feet": feet(plan.foot_names),
         "friction": plan.robot.friction,
         "weight": plan.weight,
         "center": ((x.min(0) + x.max(0)) / 2).tolist(),
         "bodies": bodies,
         "legs": legs,
-        "torso": _torso(plan),
+        "torso": torso,
         "plan": _motion(motion),
         "replay": None if replayed is None else _motion(replayed),
         "ground": _ground(archive, plan, motion),
-        "footholds": _footholds(plan),
+        "footholds": footholds(plan.t, plan.foot_contact, plan.foot_position, plan.foot_normal),
         "patches": _patches(archive),
         "map": drawn,
         "warped": warped,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,17 +23,15 @@ _REACH = 0.8  # m around the way, where the grid is drawn
 
 @dataclass(frozen=True)
 class Warping:
-    """φ as a tri-cubic spline."""
+    """φ inside its box."""
 
-    spline: NdBSpline
+    spline: Callable[[Array], Array]  # of points (…, 3)
     lower: Array  # (3,) m, where φ is defined in the warped space
     upper: Array  # (3,)
 
     def __call__(self, points: Array) -> Array:
         """Points (…, 3) m of the warped space in ambient space."""
-        inside = np.clip(points, self.lower, self.upper)
-        result: Array = self.spline(inside)
-        return result
+        return self.spline(np.clip(points, self.lower, self.upper))
 
 
 def warping_of(archive: Archive, plan: Plan) -> Warping | None:

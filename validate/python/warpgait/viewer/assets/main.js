@@ -14,17 +14,21 @@ function element(kind, text, parent, name) {
 
 function start() {
   const data = JSON.parse(by("data").textContent);
-  const plan = new Motion(data.plan, data.rate, data.feet.length);
+  let plan, flat;
   const replay = data.replay ? new Motion(data.replay, data.rate, data.feet.length) : null;
-  data.plan.contact = plan.contact;
+  const take = () => {
+    plan = new Motion(data.plan, data.rate, data.feet.length);
+    data.plan.contact = plan.contact;
+    flat = data.map ? new Motion(data.warped, data.rate, data.feet.length) : null;
+  };
+  take();
   if (replay) data.replay.contact = replay.contact;
   const ambient = new Ambient(by("ambient"), data);
   const warped = data.map ? new Warped(by("warped"), data) : null;
-  const flat = data.map ? new Motion(data.warped, data.rate, data.feet.length) : null;
   const options = {};
   const linked = Number(location.hash.slice(1)); // page.html#2.5 opens at 2.5 s
   const state = { time: linked >= 0 ? Math.min(linked, data.duration) : 0, playing: false, speed: 1, yaw: -0.9, pitch: 0.42, distance: 3.2, shift: [0, 0, 0], stale: true };
-  window.warpgait = { state, frames: 0 };
+  window.warpgait = { state, frames: 0, iterates: 0 };
 
   const tip = by("tip");
   function say(lines, event) {
@@ -46,6 +50,15 @@ function start() {
   by("ambient").addEventListener("pointermove", (event) => say(under(event), event));
   by("ambient").addEventListener("pointerleave", () => say(null));
   window.addEventListener("resize", () => (state.stale = true));
+
+  if (data.live) listen(data, () => {
+    take();
+    by("facts").replaceChildren();
+    facts(data, go);
+    timeline.key = null;
+    state.stale = true;
+    window.warpgait.iterates += 1;
+  });
 
   // What is near the pointer, in words.
   function under(event) {
@@ -121,6 +134,22 @@ function start() {
     window.warpgait.frames += 1;
   }
   requestAnimationFrame(frame);
+}
+
+// A solve that is watched: each iterate as it comes, and the page anew when it shows something else.
+function listen(data, changed) {
+  const source = new EventSource("/events"), problem = by("problem");
+  source.onmessage = (event) => {
+    const news = JSON.parse(event.data);
+    if (news.scene !== data.scene) return location.reload();
+    problem.hidden = true;
+    Object.assign(data, news);
+    changed();
+  };
+  source.onerror = () => {
+    problem.textContent = "The program no longer answers. This is the last that it showed.";
+    problem.hidden = false;
+  };
 }
 
 // Drag turns, with Shift or the other button it moves; the wheel or two fingers change the distance.
