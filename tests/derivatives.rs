@@ -394,3 +394,14 @@ fn a_start_in_motion_has_true_derivatives() {
         check(problem(terrain, formulation, start), &format!("{name} {formulation} moving"));
     }
 }
+
+#[test]
+fn a_cyclic_motion_has_true_derivatives() {
+    let problem = problem(
+        "kind = \"formula\"\nexpression = \"0\"",
+        "direct",
+        "[gait]\nkind = \"trot\"\ncycle = 1.25\nduty = 0.6\nperiodic = true",
+    );
+    assert!(problem.blocks().any(|(block, _)| block.name() == "closure" && block.rows() == 4 + 12 + 4 * 5));
+    check(problem, "cyclic");
+}

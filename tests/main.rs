@@ -9,6 +9,7 @@ mod claims;
 mod cli;
 mod common;
 mod conditions;
+mod cyclic;
 mod derivatives;
 mod durations;
 mod edges;

@@ -1,5 +1,6 @@
-//! The state at the first and the last sample: at rest, or as the scenario gives it.
+//! The state at the first and the last sample: at rest, as the scenario gives it, or in a cyclic motion the same.
 
+use super::cycle;
 use super::laws;
 use super::subject::{Finding, Subject, Worst};
 use super::vector::{norm, rotation_between, sub};
@@ -11,6 +12,10 @@ const TIME: f64 = 0.1;
 const LEVER: f64 = 0.3;
 
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
+    if s.scenario.gait.periodic {
+        cycle::findings(s, findings);
+        return;
+    }
     rest(s, findings);
     if let Some(state) = &s.scenario.start.state {
         given(s, state, findings);

@@ -110,6 +110,12 @@ laws! {
     START_TURN = "start_turn", "rad", Some(1e-3), None, "difference of the orientation from start.state.tilt and the heading at the beginning";
     START_FORCE = "start_force", "% m g", Some(0.5), None, "difference of the forces from start.state.forces at the beginning";
     START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the first way-point or the goal, at the beginning";
+    CYCLE = "cycle", "mm", Some(1.0), None,
+        "of a cyclic motion: distance of base and feet at the end from where they are at the start, shifted and turned (no limit is met if a foot stands at one end only)";
+    CYCLE_TURN = "cycle_turn", "rad", Some(1e-3), None, "of a cyclic motion: difference of the orientation at the end from that at the start, turned";
+    CYCLE_MOTION = "cycle_motion", "m/s", Some(1e-3), None,
+        "of a cyclic motion: differences of the velocities of base and feet, and of accelerations of the base over 0.1 s (rotations: times 0.3 m), at the end from those at the start, turned";
+    CYCLE_FORCE = "cycle_force", "% m g", Some(0.5), None, "of a cyclic motion: difference of the forces at the end from those at the start, turned";
     GOAL = "goal", "mm", Some(1.0), None, "distance from goal.position at the end";
     GOAL_YAW = "goal_yaw", "rad", Some(1e-3), None, "difference from goal.yaw at the end, where given, and from goal.turns on the way there";
     WAYPOINT = "waypoint", "mm", Some(1.0), None,

@@ -6,6 +6,7 @@
 
 mod claims;
 mod contact;
+mod cycle;
 mod derivatives;
 mod dynamics;
 mod ends;

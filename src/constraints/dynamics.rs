@@ -15,7 +15,8 @@
 //! makes each row the integral of the law against that hat. Forces are linear between samples, and p̈ nearly so. A residual
 //! that is linear between samples, whose hat averages are zero and which vanishes at both ends of the motion, vanishes
 //! everywhere. At the first and the last sample the row is the law itself: the robot rests or moves steadily there, or its accelerations are
-//! given ([`crate::nlp::Start`]).
+//! given ([`crate::nlp::Start`]). In a cyclic motion they are those of the spline at the start (`body_rates`); the end is the start
+//! ([`super::closure`]), so that the law there needs no rows of its own.
 //!
 //! Forces on the trunk (`[[force]]`) are known functions of time, linear between samples, and act at points R(t) (r − s) from the center of
 //! mass; they are added to those of the feet.
@@ -27,6 +28,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::body_rates::BodyRates;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::model::GRAVITY;
@@ -51,6 +53,8 @@ struct Stencil {
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     stencils: Vec<Stencil>,
+    /// In a cyclic motion, the rates of the momenta at the start.
+    at_start: Option<BodyRates>,
 }
 
 impl Dynamics {
@@ -61,6 +65,11 @@ impl Dynamics {
             position: vec![(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)],
             turn: vec![(k - 1, 1.0), (k + 1, 1.0)],
         })
+    }
+
+    /// Second order, for a motion whose end is its start.
+    pub fn cyclic(model: &Model) -> Self {
+        Self { at_start: Some(BodyRates::new(model, 0..1)), ..Self::centered(model.layout.intervals) }
     }
 
     /// First order, as the paper prints it (with gravity). Before the start the robot rests.
@@ -90,7 +99,7 @@ impl Dynamics {
                 }
             })
             .collect();
-        Self { stencils }
+        Self { stencils, at_start: None }
     }
 
     /// The multipliers of the force and the torque at sample l, which enter the rows of its neighbors too.
@@ -129,6 +138,11 @@ impl Constraint for Dynamics {
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         lower.fill(0.0);
         upper.fill(0.0);
+        if self.at_start.is_some() {
+            let last = 6 * (self.stencils.len() - 1);
+            lower[last..].fill(f64::NEG_INFINITY);
+            upper[last..].fill(f64::INFINITY);
+        }
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
@@ -166,6 +180,9 @@ impl Constraint for Dynamics {
                 out[6 * k + c] = force[c];
                 out[6 * k + 3 + c] = torque[c];
             }
+        }
+        if let Some(rates) = &self.at_start {
+            rates.subtract(model, state, out);
         }
         for inertia in &model.leg_terms.inertia {
             let torque = foot_in_base::inertial_torque(model, state, inertia);
@@ -245,6 +262,9 @@ impl Constraint for Dynamics {
                 turn.add_along(&form.row(c).transpose(), &mut sink.row(row + 3 + c));
             }
         }
+        if let Some(rates) = &self.at_start {
+            rates.jacobian(model, state, first, sink);
+        }
         for inertia in &model.leg_terms.inertia {
             for (l, weight) in inertia.stencil() {
                 for c in 0..3 {
@@ -312,6 +332,9 @@ impl Constraint for Dynamics {
                 form.foothold += cross;
                 form.base -= cross;
             }
+        }
+        if let Some(rates) = &self.at_start {
+            rates.hessian(model, state, multipliers, sink);
         }
         for inertia in &model.leg_terms.inertia {
             let torque = Vector3::from_column_slice(&multipliers[6 * inertia.sample + 3..][..3]);

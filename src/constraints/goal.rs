@@ -22,7 +22,9 @@ const PASSING: f64 = 0.95;
 /// The end of the motion.
 pub fn goal(model: &Model, scenario: &Scenario) -> LinearRows {
     let goal = &scenario.goal;
-    let rows = pose(model, model.layout.intervals, goal.position, scenario.goal_yaw(), goal.height);
+    // The closure of a cyclic motion has the heading.
+    let yaw = scenario.goal_yaw().filter(|_| model.cycle.is_none());
+    let rows = pose(model, model.layout.intervals, goal.position, yaw, goal.height);
     LinearRows { name: "goal", rows }
 }
 

@@ -5,6 +5,8 @@
 //! holds between the samples is in [`margins`].
 
 pub mod base_clearance;
+mod body_rates;
+pub mod closure;
 pub mod durations;
 pub mod dynamics;
 pub mod fixed_foothold;

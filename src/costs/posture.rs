@@ -18,22 +18,14 @@ pub struct Posture {
 }
 
 impl Posture {
-    /// For every stance; for the first and the last at the very start and end.
+    /// For every stance; for the first and the last at the very start and end, unless the motion is cyclic.
     pub fn new(model: &Model, weight: f64) -> Self {
         let mut places = Vec::new();
-        let last = model.layout.intervals;
+        let within = 0.0..=model.layout.intervals as f64;
         for (i, foot) in model.layout.feet.iter().enumerate() {
-            for stance in &foot.stances {
-                let s = stance.stance;
-                let k = if s.start == 0.0 {
-                    0
-                } else if s.end == last as f64 {
-                    last
-                } else {
-                    (0.5 * (s.start + s.end)) as usize
-                };
-                places.push((i, k));
-            }
+            // In a cyclic motion the other part of the stance has its middle.
+            let middles = (0..foot.stances.len()).map(|j| model.halfway(i, j));
+            places.extend(middles.filter(|k| within.contains(k)).map(|k| (i, k as usize)));
         }
         Self { weight: 2.0 * weight, places }
     }

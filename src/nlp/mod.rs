@@ -22,6 +22,7 @@
 
 pub mod contact_force;
 pub mod curvature;
+pub mod cycle;
 pub mod foot_in_base;
 pub mod ground_normal;
 pub mod leg_terms;
@@ -33,6 +34,7 @@ pub mod state;
 pub mod tangent;
 pub mod term;
 
+pub use cycle::Cycle;
 pub use leg_terms::LegTerms;
 pub use model::Model;
 pub use start::Start;

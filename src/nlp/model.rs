@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::cycle::Cycle;
 use super::leg_terms::LegTerms;
 use super::start::Start;
 use crate::leg::Leg;
@@ -120,6 +121,8 @@ pub struct Model {
     pub applied: Vec<Vec<[Vector3<f64>; 2]>>,
     /// What is given of the state at the start, beside the place and the heading.
     pub start: Option<Start>,
+    /// What the end of a cyclic motion is to its start; none for others.
+    pub cycle: Option<Cycle>,
     /// Of the base at the end, m/s; none at rest.
     pub goal_velocity: Option<Vector3<f64>>,
     /// The spaces of the variables.
@@ -164,6 +167,7 @@ impl Model {
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),
             foot_names,
             underside,
+            cycle: Cycle::of(scenario, &surfaces),
             surfaces,
             patches: Vec::new(),
             start: None,
@@ -181,7 +185,8 @@ impl Model {
                     force: scenario.discretization.force_knots,
                 },
                 swing_shape,
-                [scenario.start.moves(), scenario.goal.velocity.is_some()],
+                [scenario.start.moves(), scenario.goal.velocity.is_some()]
+                    .map(|moves| moves || scenario.gait.periodic),
             ),
         }
     }
@@ -189,6 +194,19 @@ impl Model {
     /// The patch of a stance, where there is one.
     pub fn patch(&self, foot: usize, stance: usize) -> Option<&Patch> {
         self.patches.get(foot).map(|stances| &stances[stance])
+    }
+
+    /// When a stance is halfway over, in samples ([`Stance::middle`]); in a cyclic motion, where one that begins or ends with the motion is part
+    /// of a longer one, the middle of that, which may be before the start or after the end.
+    pub fn halfway(&self, foot: usize, stance: usize) -> f64 {
+        let (last, stances) = (self.layout.intervals as f64, &self.layout.feet[foot].stances);
+        let this = &stances[stance].stance;
+        if self.cycle.is_none() {
+            return this.middle(last);
+        }
+        let start = if stance == 0 { stances[stances.len() - 1].stance.start - last } else { this.start };
+        let end = if stance + 1 == stances.len() { stances[0].stance.end + last } else { this.end };
+        0.5 * (start + end)
     }
 
     /// The forces on the trunk at sample k, and where they act.

@@ -69,6 +69,8 @@ pub struct SwingPoint {
 /// All nodes at one x.
 #[derive(Clone, Debug)]
 pub struct State {
+    /// The variables.
+    pub x: Vec<f64>,
     /// By sample.
     pub base: Vec<BaseNode>,
     /// Half way from each sample to the next; empty where the geometry of no leg is known.
@@ -125,6 +127,7 @@ impl State {
         let between = |i: usize| 0..if model.legs[i].is_some() { layout.intervals } else { 0 };
         let swing_points: Vec<Vec<SwingPoint>> = (0..feet).map(|i| swing_points(model, i)).collect();
         Self {
+            x: vec![0.0; layout.variables],
             base: vec![BaseNode { point, turn }; samples],
             base_between: vec![
                 BaseNode { point, turn };
@@ -157,6 +160,7 @@ impl State {
     /// Evaluates all nodes at x; if `curved`, with what second derivatives of constraints need.
     pub fn update(&mut self, model: &Model, x: &[f64], curved: bool) {
         let layout = &model.layout;
+        self.x.copy_from_slice(x);
         let order = if curved { Order::Third } else { Order::Second };
         let foot_at = |node: &LinearNode, order: Order| {
             let point = model.spaces.feet.jet(&Vector3::from(node.value::<3>(x)), order);

@@ -13,7 +13,6 @@ use crate::nlp::Model;
 use crate::nlp::model::Visit;
 use crate::scenario::{PostureSpec, Scenario, wrapped};
 use crate::terrain::Patch;
-use crate::trajectory::Stance;
 use crate::trajectory::rotation::euler_angles;
 
 /// The base departs this long before the first swing, and arrives this long after the last one, s.
@@ -119,7 +118,10 @@ impl<'a> BasePath<'a> {
             posture: scenario.posture.clone(),
             ends: [first, last],
             length: way.length,
-            pace: Pace::new([depart, arrive], way.length, &stops, layout.intervals, layout.time_step),
+            pace: match model.cycle {
+                Some(_) => Pace::even(horizon, way.length, layout.time_step),
+                None => Pace::new([depart, arrive], way.length, &stops, layout.intervals, layout.time_step),
+            },
             bent: bent.transpose()?,
             way,
             timing: None,
@@ -272,16 +274,5 @@ impl<'a> BasePath<'a> {
         let angles = euler_angles(&pose.rotation);
         let expected = first[5] + heading - self.way.at(0.0)[2];
         [x, y, pose.position.z, angles.x, angles.y, expected + wrapped(angles.z - expected)]
-    }
-}
-
-/// When a stance is halfway over, in samples; where it begins or ends with the motion, that end, at which the base is at rest.
-pub fn middle(stance: &Stance, last: f64) -> f64 {
-    if stance.start == 0.0 {
-        0.0
-    } else if stance.end == last {
-        last
-    } else {
-        0.5 * (stance.start + stance.end)
     }
 }

@@ -16,7 +16,7 @@ use std::collections::HashSet;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::base_path::{BasePath, FootMotion, REACH_MARGIN, middle};
+use super::base_path::{BasePath, FootMotion, REACH_MARGIN};
 use super::standing::Pose;
 use crate::nlp::Model;
 use crate::nlp::model::FixedFoothold;
@@ -256,8 +256,8 @@ impl<'a> Search<'a> {
         let last = layout.intervals as f64;
         let steady = |k: f64| self.path.steady(k * layout.time_step);
         let [before, this] = [stance - 1, stance].map(|j| &layout.feet[foot].stances[j].stance);
-        let [begin, mid] = [this.start, middle(this, last)].map(steady);
-        let travel = mid - steady(middle(before, last));
+        let [begin, mid] = [this.start, this.middle(last)].map(steady);
+        let travel = mid - steady(before.middle(last));
         let stays = this.end == last;
         let mut found: Vec<(f64, usize, Place, [f64; 2])> = Vec::new();
         let mut nearest = None;

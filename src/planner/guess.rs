@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::base_path::{BasePath, middle};
+use super::base_path::BasePath;
 use crate::Result;
 use crate::nlp::Model;
 use crate::scenario::Scenario;
@@ -36,6 +36,13 @@ pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
 fn set_base(path: &BasePath, model: &Model, x: &mut [f64]) {
     let layout = &model.layout;
     let spline = &layout.base_spline;
+    if model.cycle.is_some() {
+        // A control point's Greville abscissa is the knot before it.
+        let at = |i: usize| path.at((i as f64 - 1.0) * spline.spacing);
+        let points: Vec<[f64; 6]> = (0..spline.points()).map(at).collect();
+        spline.set(&points, x);
+        return;
+    }
     for block in 0..spline.blocks() {
         // Block b is control point b + 2, whose Greville abscissa is knot b + 1; the outer ones are at rest.
         let t = match block {
@@ -72,7 +79,6 @@ fn set_given(model: &Model, x: &mut [f64]) {
 /// `[foot][stance]`.
 fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Vec<Vector3<f64>>>> {
     let layout = &model.layout;
-    let last = layout.intervals as f64;
     let mut footholds = Vec::new();
     for (i, foot) in layout.feet.iter().enumerate() {
         let on_ground = foot.stances.iter().enumerate().map(|(j, stance)| {
@@ -85,7 +91,7 @@ fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Ve
                     let height = model.surfaces.feet.height(x, y);
                     pulled_back(&model.spaces.feet, &Vector3::new(x, y, height))?
                 }
-                None => foothold_under(model, i, &path.at(middle(&stance.stance, last) * layout.time_step)),
+                None => foothold_under(model, i, &path.at(model.halfway(i, j) * layout.time_step)),
             };
             x[stance.foothold.first()..][..3].copy_from_slice(foothold.as_slice());
             Ok(foothold)

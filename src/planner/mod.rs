@@ -3,6 +3,8 @@
 //! | file | holds |
 //! | --- | --- |
 //! | [`problem`] | which variables, bounds, constraints and costs there are, and their sparse derivatives |
+//! | `bounds` | the bounds of the variables |
+//! | `cyclic` | whether the ground repeats itself under a cyclic motion |
 //! | `way` | the line of the base from start to goal, with headings |
 //! | `base_path` | where the base is guessed to be at each time |
 //! | `pace` | when it is where on its way, if it travels steadily |
@@ -26,6 +28,8 @@
 //! | `threads` | the evaluation, split between two threads |
 
 mod base_path;
+mod bounds;
+mod cyclic;
 pub mod derivatives;
 mod elastic;
 mod foothold_search;

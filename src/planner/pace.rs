@@ -16,6 +16,8 @@ pub struct Pace {
     length: f64,
     /// Between two samples, s.
     time_step: f64,
+    /// Without speeding up and slowing down.
+    even: bool,
     /// At each sample, m, where some stops have times.
     timed: Option<Vec<f64>>,
     /// The samples at which the base must be at a stop, and where that is, m.
@@ -46,7 +48,12 @@ impl Pace {
             let nominal: Vec<f64> = (0..=intervals).map(at).collect();
             retimed(&nominal, &[], &pins, time_step)
         });
-        Self { travel, length, time_step, timed, pins }
+        Self { travel, length, time_step, even: false, timed, pins }
+    }
+
+    /// The same speed from the start to the end, s, and beyond them.
+    pub fn even(horizon: f64, length: f64, time_step: f64) -> Self {
+        Self { travel: [0.0, horizon], length, time_step, even: true, timed: None, pins: Vec::new() }
     }
 
     /// How long the base travels, s.
@@ -58,6 +65,7 @@ impl Pace {
     pub fn at(&self, t: f64) -> f64 {
         match &self.timed {
             Some(timed) => interpolated(timed, t / self.time_step),
+            None if self.even => self.length * t / self.travel[1],
             None => self.length * progress(t, self.travel[0], self.travel[1]),
         }
     }

@@ -1,6 +1,7 @@
 //! The one place where the problem is composed: variables with bounds, constraint blocks, costs, and their sparse derivatives.
 
 use crate::constraints::base_clearance::BaseClearance;
+use crate::constraints::closure::Closure;
 use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
 use crate::constraints::fixed_foothold::fixed_footholds;
@@ -26,11 +27,13 @@ use crate::costs::posture::Posture;
 use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::{Multipliers, NlpProblem};
 use crate::scenario::{Cone, Law, PostureSpec, Scenario};
+use crate::trajectory::base::RATES;
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::bounds::{given_rows, variable_bounds};
 use super::threads::ThreadSplit;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::model::GRAVITY;
@@ -92,6 +95,7 @@ impl GaitProblem {
         let mut blocks: Vec<Box<dyn Constraint>> = vec![
             match scenario.physics.law {
                 Law::PcdmBackward => Box::new(Dynamics::backward(intervals)),
+                Law::Pcdm if model.cycle.is_some() => Box::new(Dynamics::cyclic(&model)),
                 Law::Pcdm => Box::new(Dynamics::centered(intervals)),
                 Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
@@ -106,6 +110,9 @@ impl GaitProblem {
             Box::new(BaseClearance::new(&model, motion.base_clearance)),
             Box::new(goal(&model, scenario)),
         ];
+        if let Some(cycle) = &model.cycle {
+            blocks.push(Box::new(Closure::new(&model, cycle)));
+        }
         if scenario.posture != PostureSpec::default() {
             blocks.push(Box::new(posture(&model, &scenario.posture)));
         }
@@ -253,12 +260,11 @@ impl GaitProblem {
             return format!("base control point {} {}", v / 6, axis(v % 6));
         }
         let within = |first: &usize, count: usize| (*first..*first + count).contains(&v);
-        if let Some(first) = spline.start.filter(|first| within(first, 12)) {
-            let what = if v - first < 6 { "velocity" } else { "acceleration" };
-            return format!("base {what} at the start {}", axis((v - first) % 6));
-        }
-        if let Some(first) = spline.end.filter(|first| within(first, 6)) {
-            return format!("base velocity at the end {}", axis(v - first));
+        for (rates, end) in [(spline.start, "start"), (spline.end, "end")] {
+            if let Some(first) = rates.filter(|first| within(first, RATES)) {
+                let what = if v - first < 6 { "velocity" } else { "acceleration" };
+                return format!("base {what} at the {end} {}", axis((v - first) % 6));
+            }
         }
         for (name, foot) in self.model.foot_names.iter().zip(&layout.feet) {
             for (j, stance) in foot.stances.iter().enumerate() {
@@ -288,50 +294,6 @@ impl GaitProblem {
         }
         format!("variable {v}")
     }
-}
-
-/// Rows of which a given start leaves no variable: nothing that the solver could do would change them. They are judged by the check.
-fn given_rows(model: &Model, jacobian: &Pattern, lower: &[f64], upper: &[f64], rows: usize) -> Vec<usize> {
-    if model.start.is_none() {
-        return Vec::new();
-    }
-    let mut fixed = vec![true; rows];
-    for (row, column) in jacobian.rows.iter().zip(&jacobian.columns) {
-        fixed[*row as usize] &= lower[*column as usize] == upper[*column as usize];
-    }
-    (0..rows).filter(|row| fixed[*row]).collect()
-}
-
-/// What is given of the start, and of the base's velocity at the end, is pinned. Switches stay within their rooms. In F, the free control points of a swing stay
-/// above the ground: a spline obeys z̄ ≥ 0 at every instant if its control points do (Eq. 8, second line). With edges, z̄ = 0
-/// is the posture surface, which is not the ground.
-fn variable_bounds(model: &Model, initial: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let mut lower = vec![f64::NEG_INFINITY; model.layout.variables];
-    let mut upper = vec![f64::INFINITY; model.layout.variables];
-    lower[..6].copy_from_slice(&initial[..6]);
-    upper[..6].copy_from_slice(&initial[..6]);
-    let spline = &model.layout.base_spline;
-    let rates = [(spline.start, 12), (spline.end, 6)];
-    let rates = rates.into_iter().filter_map(|(first, count)| first.map(|first| first..first + count));
-    let given = model.start.iter().flat_map(|start| start.variables(&model.layout)).map(|(range, _)| range);
-    for v in rates.chain(given).flatten() {
-        (lower[v], upper[v]) = (initial[v], initial[v]);
-    }
-    for swing in model.layout.feet.iter().flat_map(|f| &f.swings) {
-        if model.spaces.feet.is_warped() && !model.surfaces.have_edges() {
-            for c in 0..model.layout.swing_shape.free() {
-                lower[swing.control_points + 3 * c + 2] = 0.0;
-            }
-        }
-        if let Some(lift_off) = swing.switches {
-            let s = &swing.swing;
-            for (n, nominal) in [s.start, s.end].into_iter().enumerate() {
-                lower[lift_off + n] = nominal - s.room[n];
-                upper[lift_off + n] = nominal + s.room[n];
-            }
-        }
-    }
-    (lower, upper)
 }
 
 /// The terms of the Lagrangian: the blocks' rows times their multipliers, then the costs times a factor.

@@ -1,5 +1,6 @@
 //! How many steps a motion takes over ground with edges, and where they are.
 
+use super::cyclic::ensure_repeats;
 use super::footholds::{Assignment, assign};
 use super::travel::{ensure_within_range, is_unhurried};
 use crate::nlp::Model;
@@ -62,6 +63,7 @@ impl Steps {
     /// Those of the gait; for a goal out of range; and, if no number of steps will do, what is wrong with the usual number: which foot
     /// finds nothing to stand on, where and when.
     pub fn of(scenario: &Scenario, robot: &Robot, surfaces: &Surfaces) -> Result<Self> {
+        ensure_repeats(scenario, robot, surfaces)?;
         let gaits = Gait::choices(scenario, robot)?;
         ensure_within_range(scenario, robot, &gaits)?;
         let gaits = with_fixed(scenario, robot, gaits)?;

@@ -4,6 +4,7 @@
 //! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
 
 use super::condition_checks;
+use super::cyclic;
 use super::ends;
 use super::format::{Formulation, Scenario};
 use super::gait_kind::GaitKind;
@@ -27,6 +28,7 @@ const PHASE_TOLERANCE: f64 = 1e-6;
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
     one_robot(document)?;
     way::check(document, scenario)?;
+    cyclic::check(document, scenario)?;
     ends::check(document, scenario, robot)?;
     terrain(document, scenario)?;
     if let Some(extent) = scenario.terrain.extent() {

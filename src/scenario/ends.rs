@@ -33,7 +33,11 @@ fn moving(document: &Document, scenario: &Scenario) -> Result<()> {
     if !scenario.moves_at_ends() {
         return Ok(());
     }
-    let key = if scenario.start.moves() { "start.state" } else { "goal.velocity" };
+    let key = match () {
+        () if scenario.gait.periodic => "gait.periodic",
+        () if scenario.start.moves() => "start.state",
+        () => "goal.velocity",
+    };
     let because = format!("the base moves at an end ({})", document.place(key));
     if scenario.formulation() == Formulation::Warped {
         let what = format!("given \"warped\", but {because}; allowed: \"hybrid\", \"direct\"");

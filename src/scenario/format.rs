@@ -87,6 +87,8 @@ impl Scenario {
     /// The space in which the variables live.
     pub fn formulation(&self) -> Formulation {
         self.formulation.unwrap_or(match self.footholds() {
+            // A shift in F is not one in ambient space.
+            _ if self.gait.periodic => Formulation::Direct,
             Footholds::Anywhere if !self.moves_at_ends() => Formulation::Warped,
             _ => Formulation::Hybrid,
         })
@@ -94,7 +96,7 @@ impl Scenario {
 
     /// Whether the base moves at the start or at the end.
     pub fn moves_at_ends(&self) -> bool {
-        self.start.moves() || self.goal.velocity.is_some()
+        self.start.moves() || self.goal.velocity.is_some() || self.gait.periodic
     }
 
     /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is

@@ -20,6 +20,10 @@ pub struct GaitSpec {
     /// tripod, pace and bound 0.6, flying-trot 0.4, hop and pronk 0.55 (on one foot 0.65).
     #[schemars(range(min = 0.1, max = 1.0))]
     pub duty: Option<f64>,
+    /// Whether the motion is cyclic: its end is its start, shifted to the goal and turned by the goal's yaw, with nothing at rest, so that
+    /// it can be repeated. As many cycles as fill the horizon.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub periodic: bool,
     /// Whether the phase durations are variables.
     pub optimize_durations: bool,
     /// Shortest and longest phase duration, s.
@@ -39,6 +43,7 @@ impl Default for GaitSpec {
             kind: GaitKind::Walk,
             cycle: None,
             duty: None,
+            periodic: false,
             optimize_durations: false,
             duration_bounds: [0.1, 2.0],
             sequence: None,

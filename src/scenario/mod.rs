@@ -7,6 +7,7 @@ mod condition_checks;
 mod conditions;
 mod consistency;
 mod continued;
+mod cyclic;
 mod ends;
 pub mod examples;
 mod format;

@@ -134,7 +134,12 @@ pub(super) fn horizon(scenario: &Scenario, robot: &Robot) -> Option<f64> {
     let turn = if scenario.stops().is_empty() { scenario.turn().unwrap_or(0.0) } else { 0.0 };
     let length = scenario.way_length() + turn.abs() * from_middle.fold(0.0, f64::max);
     let step = scenario.time_step;
-    let seconds = step * ((length / speed + ENDS) / step).ceil();
+    let steps = if scenario.gait.periodic {
+        (length / speed / step).round()
+    } else {
+        ((length / speed + ENDS) / step).ceil()
+    };
+    let seconds = step * steps;
     Some((1e9 * seconds).round() / 1e9)
 }
 

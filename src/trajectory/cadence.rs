@@ -44,7 +44,8 @@ pub(super) struct Cadence {
 
 /// How far the mean speed is from an ordinary one to one for which the feet must leave the ground, 0 to 1; in proportion to the speed.
 fn quickness(scenario: &Scenario, robot: &Robot) -> f64 {
-    let speed = scenario.way_length() / (scenario.horizon - ENDS).max(scenario.time_step);
+    let ends = if scenario.gait.periodic { 0.0 } else { ENDS };
+    let speed = scenario.way_length() / (scenario.horizon - ends).max(scenario.time_step);
     let [ordinary, flying] = SPEEDS.map(|froude| (froude * GRAVITY * robot.standing_height()).sqrt());
     ((speed - ordinary) / (flying - ordinary)).clamp(0.0, 1.0)
 }
@@ -103,11 +104,11 @@ impl Cadence {
         Self { cycle: fraction * self.cycle, duty: 1.0 - (1.0 - self.duty) / fraction }
     }
 
-    /// As many whole cycles as fit into a window with standing at both ends. The remaining time is divided between the ends.
+    /// The duration of a swing, in time steps.
     ///
     /// # Errors
-    /// [`Error::Key`] with the key `horizon` where no cycle fits, with the section's `cycle` where phases are too short for the time step.
-    pub fn swings(&self, lift_offs: &[f64], window: &Window, step: f64) -> Result<Vec<Vec<Swing>>> {
+    /// [`Error::Key`] with the section's `cycle` where phases are too short for the time step.
+    pub fn swing(&self, step: f64) -> Result<f64> {
         let &Self { cycle, duty } = self;
         let swing = ((1.0 - duty) * cycle / step).round();
         if swing < SHORTEST_PHASE {
@@ -124,6 +125,15 @@ impl Cadence {
             );
             return Err(Error::key("cycle", what));
         }
+        Ok(swing)
+    }
+
+    /// As many whole cycles as fit into a window with standing at both ends. The remaining time is divided between the ends.
+    ///
+    /// # Errors
+    /// [`Error::Key`] with the key `horizon` where no cycle fits, with the section's `cycle` where phases are too short for the time step.
+    pub fn swings(&self, lift_offs: &[f64], window: &Window, step: f64) -> Result<Vec<Vec<Swing>>> {
+        let (swing, &Self { cycle, duty }) = (self.swing(step)?, self);
         let last = lift_offs.iter().fold(0.0, |a: f64, &b| a.max(b)) + (1.0 - duty);
         // n cycles take n − 1 + last times the duration of one; the summand of 1e-9 absorbs rounding.
         let (duration, [before, after]) = (window.to - window.from, window.stand);

@@ -2,6 +2,7 @@
 //! their kinks at the same times. With `gait.optimize_durations` each switch may move within some room; see [`super::switches`].
 
 use super::cadence::{Cadence, Window};
+use super::cyclic;
 use super::footfall::lift_offs;
 use super::phase::{SHORTEST_PHASE, Stance, Swing};
 use super::switches;
@@ -59,6 +60,7 @@ impl Gait {
         let feet = robot.feet.len();
         let mut swings = match gait.kind {
             GaitKind::Custom => custom(gait.phases.as_deref(), feet, step, intervals)?,
+            _ if gait.periodic => periodic(scenario, robot, fraction)?,
             _ => sequence(scenario, robot, fraction)?,
         };
         if gait.optimize_durations {
@@ -91,6 +93,35 @@ fn has_shorter_cycles(scenario: &Scenario, robot: &Robot, fraction: f64) -> bool
     let stands =
         |section: &SectionSpec| Cadence::of(section, scenario, robot).with_cycle(fraction).duty >= LEAST_DUTY;
     open.peek().is_some() && open.all(stands)
+}
+
+/// The swings of each foot of a cyclic motion.
+fn periodic(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec<Swing>>> {
+    let gait = &scenario.gait;
+    let section = &gait.sections()[0];
+    let keyed = |e: Error| match e {
+        Error::Key { key, what } => Error::key(section_key(gait, 0, &key), what),
+        other => other,
+    };
+    let mut cadence = Cadence::of(section, scenario, robot);
+    if Cadence::is_open(section) {
+        cadence = cadence.with_cycle(fraction);
+    }
+    // Whole cycles.
+    let cycle = scenario.horizon / scenario.cycles(section, cadence.cycle);
+    let (step, cadence) = (scenario.time_step, Cadence { cycle, ..cadence });
+    let lift_offs = lift_offs(section.kind, robot).map_err(keyed)?;
+    let intervals = (scenario.horizon / step).round() as usize;
+    let swings = cyclic::swings(&cadence, &lift_offs, intervals, step).map_err(keyed)?;
+    let outside = |s: &Swing| s.start <= 0.0 || s.end >= intervals as f64;
+    if swings.iter().flatten().any(outside) {
+        let what = format!(
+            "given \"{}\", in which not all feet ever stand for two time steps, but a cyclic motion (gait.periodic) begins so; raise the duty",
+            section.kind
+        );
+        return Err(Error::key("gait.kind", what));
+    }
+    Ok(swings)
 }
 
 /// The swings of each foot, section by section.

@@ -15,7 +15,7 @@
 
 use std::ops::Range;
 
-use super::base::BaseSpline;
+use super::base::{BaseSpline, RATES};
 use super::gait::Gait;
 use super::instant::Instant;
 use super::node::LinearNode;
@@ -99,11 +99,11 @@ impl Layout {
             end: None,
         };
         let mut variables = 6 * base_spline.blocks();
-        let mut rates = |moves: bool, count: usize| {
-            variables += if moves { count } else { 0 };
-            moves.then(|| variables - count)
+        let mut rates = |moves: bool| {
+            variables += if moves { RATES } else { 0 };
+            moves.then(|| variables - RATES)
         };
-        (base_spline.start, base_spline.end) = (rates(moves[0], 12), rates(moves[1], 6));
+        (base_spline.start, base_spline.end) = (rates(moves[0]), rates(moves[1]));
         let mut layout = Self {
             time_step,
             intervals: gait.intervals,

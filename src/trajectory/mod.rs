@@ -5,6 +5,7 @@
 
 pub mod base;
 mod cadence;
+mod cyclic;
 mod footfall;
 pub mod gait;
 pub mod instant;

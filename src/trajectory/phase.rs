@@ -12,6 +12,19 @@ pub struct Stance {
     pub end: f64,
 }
 
+impl Stance {
+    /// When it is halfway over, in samples; where it begins or ends with a motion of so many samples, that end, at which the base is at rest.
+    pub fn middle(&self, last: f64) -> f64 {
+        if self.start == 0.0 {
+            0.0
+        } else if self.end == last {
+            last
+        } else {
+            0.5 * (self.start + self.end)
+        }
+    }
+}
+
 /// A phase in which a foot is in the air; times in samples. Both ends belong to a stance, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {

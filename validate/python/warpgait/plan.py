@@ -28,7 +28,7 @@ SCHEMA = 1
 # Tolerances of a reader; a writer keeps double precision.
 _UNIFORM = 1e-6  # of the mean step, by which the steps of `t` may differ
 _START = 1e-9  # s, of the first time
-_SHORTEST, _LONGEST = 0.1, 600.0  # s, what a plan may last, as in a scenario
+_SHORTEST, LONGEST = 0.1, 600.0  # s, what a plan may last, as in a scenario
 _MOST_CELLS = 2e7  # of the ground as it is replayed: cells of 2.5 cm over 110 m by 110 m
 _UNIT = 1e-6  # of the length of a unit vector or quaternion
 
@@ -113,6 +113,7 @@ class Plan:
     pull_limit: float  # largest pull of an adhesive foot, fraction of m g; 0 if no foot is adhesive
     solved: bool  # every constraint of the NLP holds
     meta: Mapping[str, Any] = field(repr=False)
+    cycles: int = 1  # how often the file's motion is repeated (`cycles.repeated`)
 
     @property
     def duration(self) -> float:
@@ -277,8 +278,8 @@ def read_plan(path: str | Path) -> Plan:
     t = values["t"]
     if len(t) < 3 or abs(t[0]) > _START or t[-1] <= 0 or np.ptp(np.diff(t)) > _UNIFORM * t[-1] / (len(t) - 1):
         raise check.fail("t", "expected at least three uniform times that begin at 0")
-    if not _SHORTEST <= t[-1] <= _LONGEST:
-        raise check.fail("t", f"lasts {t[-1]:.3g} s; a plan lasts between {_SHORTEST:g} and {_LONGEST:g} s")
+    if not _SHORTEST <= t[-1] <= LONGEST:
+        raise check.fail("t", f"lasts {t[-1]:.3g} s; a plan lasts between {_SHORTEST:g} and {LONGEST:g} s")
     for member in ("base_quaternion_wxyz", "foot_normal"):
         worst = np.abs(np.linalg.norm(values[member], axis=-1) - 1.0).max()
         if worst > _UNIT:

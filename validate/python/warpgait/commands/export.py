@@ -41,6 +41,7 @@ def _parser() -> argparse.ArgumentParser:
         default="plan",
         help="the planned motion, or the simulated one in NAME.replay.npz (default %(default)s)",
     )
+    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="a cyclic plan N times in a row (default %(default)s)")
     parser.add_argument("--list", action="store_true", help="show the formats")
     parser.add_argument("--json", action="store_true", help="print what was written, with the certificate, as JSON")
     parser.add_argument("-q", "--quiet", action="store_true", help="print errors only")
@@ -66,13 +67,14 @@ def chosen(name: str | None) -> Format:
     return known[name]
 
 
-def motion_for(plan: Path, target: Format, source: str, rate: float | None) -> Motion:
+def motion_for(plan: Path, target: Format, source: str, rate: float | None, repeat: int = 1) -> Motion:
     """The motion that a format is to have; raises `InputError`, also if the robot has no joints and the format needs them."""
+    from ..cycles import repeated
     from ..model import available_models
     from ..motions import motion_of_plan, motion_of_replay
     from ..plan import read_plan
 
-    loaded = read_plan(plan)
+    loaded = repeated(read_plan(plan), repeat)
     if target.joints and loaded.robot.name not in available_models():
         with_joints = ", ".join(name for name, each in formats().items() if not each.joints)
         raise InputError(
@@ -84,13 +86,13 @@ def motion_for(plan: Path, target: Format, source: str, rate: float | None) -> M
 
 
 def export(
-    plan: Path, target: Format, output: Path | None = None, source: str = "plan", rate: float | None = None
+    plan: Path, target: Format, output: Path | None = None, source: str = "plan", rate: float | None = None, repeat: int = 1
 ) -> tuple[list[Path], Motion]:
     """Write a motion; returns the files, and the motion."""
     from ..ground import write_heightfield
 
     output = output or plan.parent / f"{stem_of(plan)}{target.ending}"
-    motion = motion_for(plan, target, source, rate)
+    motion = motion_for(plan, target, source, rate, repeat)
     ground = output.with_name(f"{stem_of(plan)}{_GROUND}")
     outputs = [*target.outputs(output), *([] if target.ground else [ground])]
     for folder in {path.parent for path in target.outputs(output) if target.files}:
@@ -129,7 +131,7 @@ def _main(options: argparse.Namespace) -> int:
         return 0
     if options.plan is None:
         raise InputError("the plan is missing: warpgait export NAME.plan.npz --to FORMAT")
-    outputs, motion = export(options.plan, chosen(options.to), options.output, options.source, options.rate)
+    outputs, motion = export(options.plan, chosen(options.to), options.output, options.source, options.rate, options.repeat)
     if options.json:
         emit(json.dumps({"written": [str(path) for path in outputs], **motion.facts}, allow_nan=False))
     elif not options.quiet:

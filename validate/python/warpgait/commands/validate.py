@@ -58,6 +58,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's folder)")
     parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's robot")
     parser.add_argument("--rate", type=float, default=settings.rate, metavar="HZ", help="control rate (default %(default)g)")
+    parser.add_argument(
+        "--repeat", type=int, default=1, metavar="N", help="replay a cyclic plan N times in a row (default %(default)s)"
+    )
     parser.add_argument("--quick", action="store_true", help="skip the replays with finer time steps and in other worlds")
     parser.add_argument("--no-robust", action="store_true", help="skip the replays in worlds that differ from the plan's")
     parser.add_argument("--no-raw", action="store_true", help="skip the replay on the raw heightfield")
@@ -171,7 +174,7 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
     """Read the plan, replay it, write the files, and print the verdict; returns the exit code."""
     try:
         with without_opengl():
-            from .. import plan, validation
+            from .. import cycles, plan, validation
     except ImportError as error:
         packages = f"mujoco=={MUJOCO_VERSION} daqp numpy scipy"
         raise InputError(f"a Python package is missing: {error}. Run: pip install {packages}") from error
@@ -180,7 +183,7 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
         if not (options.quiet or options.json):
             print(f"validate: {visible(text)}", file=sys.stderr)
 
-    loaded = plan.read_plan(options.plan)
+    loaded = cycles.repeated(plan.read_plan(options.plan), options.repeat)
     if not options.no_files:
         _make_folder(folder)
         ensure_outputs(_outputs(options, folder), _inputs(options))

@@ -6,7 +6,7 @@ Between samples they are cubic splines, whose derivatives are the joint speeds, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from .._native import load
 from ..archive import Archive
 from ..arrays import Array, Bools
 from ..conditions import payload_of
+from ..cycles import Cycle, cycle_of
 from ..errors import InputError
 from ..files import stem_of
 from ..geometry import rotation_from_wxyz
@@ -89,11 +90,13 @@ def _planned(plan: Plan, t: Array) -> _Planned:
             direction=plan.center_direction[at],
         )
     splines = load(plan.path)
-    inside = np.minimum(t, splines.duration)
+    # The file has one cycle of a plan that is repeated.
+    number = np.minimum((t / splines.duration).astype(np.intp), plan.cycles - 1)
+    inside = np.clip(t - number * splines.duration, 0.0, splines.duration)
     base, feet = splines.base(inside), splines.feet(inside)
     direction = CubicSpline(plan.t, plan.center_direction)(t)
     direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-    return _Planned(
+    found = _Planned(
         t=t,
         center_of_mass=base.position,
         com_velocity=base.linear_velocity,
@@ -105,6 +108,22 @@ def _planned(plan: Plan, t: Array) -> _Planned:
         contact=feet.contact,
         normal=feet.normal,
         direction=direction,
+    )
+    return found if plan.cycles == 1 else _moved(found, cycle_of(plan), number)
+
+
+def _moved(planned: _Planned, cycle: Cycle, number: Array) -> _Planned:
+    """What one cycle says, after `number` (K,) others; directions, which are those of all cycles, as they are."""
+    return replace(
+        planned,
+        center_of_mass=cycle.moved(planned.center_of_mass, number),
+        com_velocity=cycle.turned(planned.com_velocity, number),
+        quaternion_wxyz=cycle.turned_quaternions(planned.quaternion_wxyz, number),
+        angular_velocity=cycle.turned(planned.angular_velocity, number),
+        contact_position=cycle.moved(planned.contact_position, number),
+        contact_velocity=cycle.turned(planned.contact_velocity, number),
+        force=cycle.turned(planned.force, number),
+        normal=cycle.turned(planned.normal, number),
     )
 
 
