@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import warpgait
 from warpgait.cycles import Cycle, repeated
 from warpgait.errors import InputError

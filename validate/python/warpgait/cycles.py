@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -86,7 +87,7 @@ def repeated(plan: Plan, count: int) -> Plan:
     cycle = cycle_of(plan)
     # The first sample of each cycle but the first is the last one of the cycle before.
     kept = [(n, slice(0 if n == 0 else 1, None)) for n in range(count)]
-    joined = {
+    joined: dict[str, Any] = {
         "t": np.concatenate([plan.t[k] + n * plan.duration for n, k in kept]),
         "base_quaternion_wxyz": np.concatenate([cycle.turned_quaternions(plan.base_quaternion_wxyz[k], n) for n, k in kept]),
         "foot_contact": np.concatenate([plan.foot_contact[k] for _, k in kept]),
