@@ -9,7 +9,7 @@
 //! A turn about the vertical adds to the yaw θ_z alone. All variables are ambient, so that the rows are linear in them. A force that is zero
 //! at one end, where the foot lifts off or touches down, is zero at the other.
 //!
-//! Rows: of the base 4, then 6 rates in m/s and rad/s, then 6 in m/s² and rad/s² over [`TIME`]; of each foot two in m and three in m g.
+//! Rows: of the base 4, then 6 rates in m/s and rad/s, then 6 in m/s² and rad/s² over a tenth of a second; of each foot two in m and three in m g.
 
 use nalgebra::Vector3;
 
