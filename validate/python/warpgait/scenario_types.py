@@ -292,6 +292,9 @@ class GaitSpec(TypedDict, total=False):
     duty: float
     """Fraction of the cycle that a foot stands; default for four feet: walk over smooth ground 5/6, over patches and wave 0.75; trot,
     tripod, pace and bound 0.6, flying-trot 0.4, hop and pronk 0.55 (on one foot 0.65)."""
+    periodic: bool
+    """Whether the motion is cyclic: its end is its start, shifted to the goal and turned by the goal's yaw, with nothing at rest, so
+    that it can be repeated. As many cycles as fill the horizon."""
     optimize_durations: bool
     """Whether the phase durations are variables."""
     duration_bounds: Numbers
