@@ -43,7 +43,8 @@ class Cycle:
         angle = np.broadcast_to(self.turn * np.asarray(count), len(vectors)).reshape(-1, *[1] * (vectors.ndim - 2))
         cos, sin = np.cos(angle), np.sin(angle)
         x, y, z = np.moveaxis(vectors, -1, 0)
-        return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
+        turned: Array = np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
+        return turned
 
     def moved(self, points: Array, count: Array | int) -> Array:
         """Points (K, …, 3) after `count` (K,) cycles."""
@@ -52,14 +53,16 @@ class Cycle:
         for _ in range(int(n.max(initial=0))):
             places.append(places[-1] + self.turned(self.shift[None], len(places) - 1)[0])
         at = np.array(places)[n].reshape(-1, *[1] * (points.ndim - 2), 3)
-        return self.turned(points - self.origin, n) + at
+        moved: Array = self.turned(points - self.origin, n) + at
+        return moved
 
     def turned_quaternions(self, quaternions: Array, count: Array | int) -> Array:
         """Scalar-first quaternions (K, 4) after `count` (K,) cycles."""
         half = 0.5 * np.broadcast_to(self.turn * np.asarray(count), len(quaternions))
         cos, sin = np.cos(half), np.sin(half)
         w, x, y, z = quaternions.T
-        return np.stack([cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w], axis=-1)
+        turned: Array = np.stack([cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w], axis=-1)
+        return turned
 
 
 def cycle_of(plan: Plan) -> Cycle:
