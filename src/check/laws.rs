@@ -58,6 +58,11 @@ laws! {
         "difference of the shift of the center of mass from that of the postures, by inverse kinematics";
     MOMENTUM = "angular_momentum", "% m g·0.3 m·s", Some(0.1), None,
         "difference of the angular momentum from that of trunk and legs, by inverse kinematics";
+    JOINT_POSITION = "joint_position", "mrad", Some(1.0), None, "difference of the joint angles from inverse kinematics";
+    JOINT_TORQUE = "joint_torque", "% of limit", Some(0.5), None, "difference of the motors' torques from inverse dynamics of the legs";
+    JOINT_RANGE = "joint_range", "mrad", Some(1.0), None, "a joint beyond its range, by inverse kinematics";
+    JOINT_SPEED_LIMIT = "joint_speed_limit", "% of limit", Some(100.0), None, "speed of a joint, by inverse kinematics";
+    JOINT_TORQUE_LIMIT = "joint_torque_limit", "% of limit", Some(100.0), None, "torque of a motor, by inverse dynamics of the legs";
     LINEAR_CONSISTENCY = "linear_consistency", "% g", Some(0.1), None,
         "base velocity and acceleration are the derivatives of the position, root mean square";
     LINEAR_CONSISTENCY_MAX = "linear_consistency_max", "% g", Some(1.0), None, "the same, worst sample";

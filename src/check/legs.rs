@@ -34,18 +34,20 @@ struct Leg {
 
 /// A link in a posture: base frame, origin at the center of mass of the nominal stance.
 #[derive(Clone, Copy)]
-struct Placed {
-    mass: f64,
-    inertia: Turn,
-    center: [f64; 3],
-    turn: Turn,
+pub(super) struct Placed {
+    pub mass: f64,
+    pub inertia: Turn,
+    pub center: [f64; 3],
+    pub turn: Turn,
 }
+
+/// A point of a joint's axis, and its direction; base frame, origin as for links.
+pub(super) type Axis = ([f64; 3], [f64; 3]);
 
 /// A leg in a posture: base frame, origin at the center of mass of the nominal stance.
 struct PlacedLeg {
     links: Vec<Placed>,
-    /// A point of each joint's axis, and its direction.
-    axes: Vec<([f64; 3], [f64; 3])>,
+    axes: Vec<Axis>,
     /// The center of the foot.
     foot: [f64; 3],
 }
@@ -56,6 +58,14 @@ pub(super) struct BodyMotion {
     pub shift: Vec<[f64; 3]>,
     /// (N − 1,) the angular momentum about the center of mass halfway between samples, world frame, kg m²/s.
     pub momentum: Vec<[f64; 3]>,
+    /// (N·E,) the joint angles of the legs, rad.
+    pub angles: Vec<[f64; 3]>,
+    /// By sample, the trunk and then the links leg by leg.
+    pub links: Vec<Vec<Placed>>,
+    /// By sample, leg by leg.
+    pub axes: Vec<Vec<Axis>>,
+    /// (N,) the orientation of the trunk.
+    pub turns: Vec<Turn>,
 }
 
 impl Leg {
@@ -143,19 +153,23 @@ impl BodyMotion {
         let centers = centers(plan, &legs);
         let mut shift = vec![[0.0; 3]; samples];
         let mut postures: Vec<Vec<Placed>> = Vec::with_capacity(samples);
+        let (mut all_axes, mut all_angles) =
+            (Vec::with_capacity(samples), Vec::with_capacity(samples * feet));
         let mut here = [0.0; 3];
         for n in 0..samples {
             let from_center = |e: usize| {
                 let world = sub(centers[n * feet + e], plan.base_position[n]);
                 rotate_back(plan.base_quaternion_wxyz[n], world)
             };
-            let mut links = Vec::new();
+            let (mut links, mut axes) = (Vec::new(), Vec::new());
             let mut found = true;
             for _ in 0..ROUNDS {
-                links = vec![trunk];
+                (links, axes) = (vec![trunk], Vec::new());
                 for (e, leg) in legs.iter().enumerate() {
                     found &= leg.solve(add(from_center(e), here), &mut angles[e]);
-                    links.extend(leg.place(&angles[e]).links);
+                    let placed = leg.place(&angles[e]);
+                    links.extend(placed.links);
+                    axes.extend(placed.axes);
                 }
                 let next = scale(1.0 / robot.mass, moment(&links));
                 let change = norm(sub(next, here));
@@ -170,6 +184,8 @@ impl BodyMotion {
                     ([0.0; 3], robot.legs.iter().map(|leg| leg.stance.unwrap_or_default()).collect());
             }
             shift[n] = if found { here } else { [f64::NAN; 3] };
+            all_angles.extend(angles.iter().copied());
+            all_axes.push(axes);
             postures.push(links);
         }
         let turns: Vec<Turn> = plan.base_quaternion_wxyz.iter().map(|q| matrix(*q)).collect();
@@ -182,15 +198,19 @@ impl BodyMotion {
                     let link = postures[n][l];
                     let orbit = scale(0.5 * link.mass / step, cross(add(a, b), sub(b, a)));
                     let [before, after] = [n - 1, n].map(|n| product(&turns[n], &postures[n][l].turn));
-                    let speed = scale(1.0 / step, turn_between(&before, &after));
-                    let spin =
-                        |turn: &Turn| apply(turn, apply(&link.inertia, apply(&transposed(turn), speed)));
-                    add(add(sum, orbit), scale(0.5, add(spin(&before), spin(&after))))
+                    add(add(sum, orbit), spin(&link.inertia, &before, &after, step))
                 })
             })
             .collect();
-        Ok(Some(Self { shift, momentum }))
+        Ok(Some(Self { shift, momentum, angles: all_angles, links: postures, axes: all_axes, turns }))
     }
+}
+
+/// The angular momentum of a body about its center that turns from `before` to `after` in `step` s.
+pub(super) fn spin(inertia: &Turn, before: &Turn, after: &Turn, step: f64) -> [f64; 3] {
+    let speed = scale(1.0 / step, turn_between(before, after));
+    let at = |turn: &Turn| apply(turn, apply(inertia, apply(&transposed(turn), speed)));
+    scale(0.5, add(at(before), at(after)))
 }
 
 /// What the links leave of the robot's mass, center of mass and inertia at the nominal stance; leaves the angles of that stance behind.

@@ -11,6 +11,7 @@ mod derivatives;
 mod dynamics;
 mod ends;
 mod ground;
+mod joints;
 mod laws;
 mod legs;
 mod measured;
@@ -67,6 +68,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     derivatives::findings(&subject, &mut findings)?;
     ends::findings(&subject, &mut findings);
     dynamics::findings(&subject, &mut findings, &mut residuals);
+    joints::findings(&subject, &mut findings);
     contact::findings(&subject, &mut findings, &mut residuals);
     patches::findings(&subject, &mut findings);
     measured::findings(&subject, &mut findings);

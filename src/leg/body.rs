@@ -47,6 +47,8 @@ pub struct Posture {
     pub rotations: Vec<Matrix3<f64>>,
     /// The joints of each leg.
     pub joints: Vec<Placed<f64>>,
+    /// Their angles, from the base down, rad.
+    pub angles: Vec<[f64; JOINTS]>,
 }
 
 /// S(c) = |c|² 1 − c cᵀ.
@@ -117,11 +119,13 @@ impl Body {
             centers: vec![self.trunk.center],
             rotations: vec![Matrix3::identity()],
             joints: Vec::with_capacity(self.legs.len()),
+            angles: Vec::with_capacity(self.legs.len()),
         };
         for (leg, foot) in self.legs.iter().zip(feet) {
             let Some(chain) = &leg.chain else { continue };
             let contact = foot - Vector3::z() * leg.foot_radius;
-            let placed = chain.place::<f64>(leg.posture::<f64>(contact.into()).joint_angles());
+            let angles = leg.posture::<f64>(contact.into()).joint_angles();
+            let placed = chain.place::<f64>(angles);
             for (j, joint) in chain.joints.iter().enumerate() {
                 let center = Vector3::from(placed.point(j, &joint.center));
                 posture.shift += center * joint.mass;
@@ -129,6 +133,7 @@ impl Body {
                 posture.rotations.push(matrix(&placed.rotation[j]));
             }
             posture.joints.push(placed);
+            posture.angles.push(angles);
         }
         posture.shift /= self.mass;
         posture

@@ -96,6 +96,17 @@ pub struct LegSamples {
     pub shift: Vec<[f64; 3]>,
     /// (N,) of the whole robot about its center of mass; world frame, kg m²/s.
     pub angular_momentum: Vec<[f64; 3]>,
+    /// Of the joints; none in plans of versions that did not write them.
+    pub joints: Option<JointSamples>,
+}
+
+/// The joints of the legs, three for each foot, from the base down.
+#[derive(Clone, Debug)]
+pub struct JointSamples {
+    /// (N·E,) rad.
+    pub position: Vec<[f64; 3]>,
+    /// (N·E,) of the motors, N m.
+    pub torque: Vec<[f64; 3]>,
 }
 
 /// Warped-space counterparts of the samples.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{GroundGrid, LegSamples, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
+use super::{GroundGrid, JointSamples, LegSamples, Meta, NamedArray, Plan, WarpedBase, WarpedSamples};
 use crate::Result;
 use crate::files::npz::NpzReader;
 use crate::robot::is_name;
@@ -42,7 +42,7 @@ impl Plan {
         }
 
         let warped = read_warped(&mut npz, n, e)?;
-        let legs = read_legs(&mut npz, n)?;
+        let legs = read_legs(&mut npz, n, e)?;
 
         let (shape, history_objective) = npz.finite_f64("history_objective")?;
         let iterations = history_objective.len();
@@ -246,13 +246,22 @@ fn read_warped(npz: &mut NpzReader, n: usize, e: usize) -> Result<Option<WarpedS
 }
 
 /// What follows from the legs' mass, if they have one.
-fn read_legs(npz: &mut NpzReader, n: usize) -> Result<Option<LegSamples>> {
+fn read_legs(npz: &mut NpzReader, n: usize, e: usize) -> Result<Option<LegSamples>> {
     if !["center_of_mass_shift", "angular_momentum"].iter().any(|name| npz.has(name)) {
         return Ok(None);
     }
+    let joints = if ["joint_position", "joint_torque"].iter().any(|name| npz.has(name)) {
+        Some(JointSamples {
+            position: npz.points("joint_position", &[n, e])?,
+            torque: npz.points("joint_torque", &[n, e])?,
+        })
+    } else {
+        None
+    };
     Ok(Some(LegSamples {
         shift: npz.points("center_of_mass_shift", &[n])?,
         angular_momentum: npz.points("angular_momentum", &[n])?,
+        joints,
     }))
 }
 

@@ -5,8 +5,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use nalgebra::Vector3;
 
 use super::{
-    GroundGrid, LegSamples, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan, WarpedBase,
-    WarpedSamples,
+    GroundGrid, JointSamples, LegSamples, Meta, MetaLimits, MetaRobot, MetaSolver, PLAN_SCHEMA, Plan,
+    WarpedBase, WarpedSamples,
 };
 use crate::ipopt::IterationRecord;
 use crate::nlp::Model;
@@ -99,6 +99,10 @@ impl Plan {
             legs: motion.legs.as_ref().map(|legs| LegSamples {
                 shift: legs.shift.iter().map(|v| (*v).into()).collect(),
                 angular_momentum: legs.angular_momentum.iter().map(|v| (*v).into()).collect(),
+                joints: Some(JointSamples {
+                    position: legs.joint_position.clone(),
+                    torque: legs.joint_torque.clone(),
+                }),
             }),
             phase_durations: phase_durations(&model.layout),
             splines: splines(motion),

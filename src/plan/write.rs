@@ -32,6 +32,9 @@ impl Plan {
         for (name, values) in self.leg_members() {
             npz.add_points(name, &[n], values)?;
         }
+        for (name, values) in self.joint_members() {
+            npz.add_points(name, &[n, e], values)?;
+        }
         if let Some(warped) = &self.warped {
             if let Some(base) = &warped.base {
                 npz.add_points("warped_base_position", &[n], &base.position)?;
@@ -110,6 +113,14 @@ impl Plan {
         })
     }
 
+    /// The arrays of shape (N, E, 3) of the joints, by member name.
+    fn joint_members(&self) -> impl Iterator<Item = (&'static str, &Vec<[f64; 3]>)> {
+        self.legs
+            .iter()
+            .filter_map(|legs| legs.joints.as_ref())
+            .flat_map(|joints| [("joint_position", &joints.position), ("joint_torque", &joints.torque)])
+    }
+
     /// The solver's history, by member name.
     fn history_members(&self) -> [(&'static str, &Vec<f64>); 3] {
         [
@@ -126,7 +137,8 @@ impl Plan {
         let base = self.base_members().map(|(name, values)| (name, n, values));
         let feet = self.foot_members().map(|(name, values)| (name, n * e, values));
         let legs = self.leg_members().map(|(name, values)| (name, n, values));
-        for (name, length, values) in base.into_iter().chain(feet).chain(legs) {
+        let joints = self.joint_members().map(|(name, values)| (name, n * e, values));
+        for (name, length, values) in base.into_iter().chain(feet).chain(legs).chain(joints) {
             ensure(name, values.len() == length, values.iter().flatten())?;
         }
         ensure("t", n >= 2, &self.t)?;

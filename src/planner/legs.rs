@@ -10,6 +10,8 @@
 //!
 //! Neither needs the accelerations of the feet, which jump at lift-off and touch-down.
 
+mod joints;
+
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -46,6 +48,10 @@ pub struct LegMotion {
     pub shift: Vec<Vector3<f64>>,
     /// Of the whole robot about its center of mass; world frame, kg m²/s.
     pub angular_momentum: Vec<Vector3<f64>>,
+    /// Of each foot's leg, from the base down, foot by foot at each end, rad.
+    pub joint_position: Vec<[f64; 3]>,
+    /// Of the motors, likewise, N m.
+    pub joint_torque: Vec<[f64; 3]>,
 }
 
 /// A motion of the whole robot in fine steps.
@@ -152,14 +158,19 @@ impl<'a> BodyMotion<'a> {
         terms
     }
 
-    /// What follows from the legs' mass at the ends of the steps. The robot is at rest at both ends.
-    pub fn samples(&self) -> LegMotion {
+    /// What follows from the legs' mass at the ends of the steps, x being the motion's variables. The robot is at rest at both ends.
+    pub fn samples(&self, x: &[f64]) -> LegMotion {
         let momenta = self.angular_momenta();
         let mut angular_momentum = vec![Vector3::zeros(); self.postures.len()];
         for (n, pair) in momenta.windows(2).enumerate() {
             angular_momentum[n + 1] = (pair[0] + pair[1]) * 0.5;
         }
-        LegMotion { shift: self.postures.iter().map(|posture| posture.shift).collect(), angular_momentum }
+        LegMotion {
+            shift: self.postures.iter().map(|posture| posture.shift).collect(),
+            angular_momentum,
+            joint_position: self.postures.iter().flat_map(|posture| posture.angles.iter().copied()).collect(),
+            joint_torque: self.motor_torques(x),
+        }
     }
 
     /// The ends of the n-th step.
@@ -189,7 +200,7 @@ impl<'a> BodyMotion<'a> {
             torque,
             inertia,
             joint_torque: (0..self.contacts.len())
-                .map(|i| (0..=intervals).map(|k| self.joint_torque(i, k * self.fine)).collect())
+                .map(|i| (0..=intervals).map(|k| self.joint_loads(i, k * self.fine)).collect())
                 .collect(),
         }
     }
@@ -227,42 +238,6 @@ impl<'a> BodyMotion<'a> {
             solve_tridiagonal(2.0 / 3.0, 1.0 / 6.0, &mut torques[1..intervals]);
         }
         torques.into_iter().map(Vector3::from).collect()
-    }
-
-    /// What the joints of a leg bear at the n-th end of a step without a force at the foot, N m.
-    fn joint_torque(&self, i: usize, n: usize) -> [f64; 3] {
-        let Some(chain) = &self.body.legs[i].chain else { return [0.0; 3] };
-        let first = 1 + chain.joints.len() * i;
-        let at = |n: usize, l: usize| {
-            self.positions[n] + self.rotations[n] * (self.postures[n].centers[l] - self.postures[n].shift)
-        };
-        let turn = |n: usize, l: usize| self.rotations[n] * self.postures[n].rotations[l];
-        let inner = n > 0 && n + 1 < self.postures.len();
-        let (posture, r) = (&self.postures[n], &self.rotations[n]);
-        let origin =
-            |j: usize| self.positions[n] + r * (Vector3::from(posture.joints[i].origin[j]) - posture.shift);
-        // Of each link: the force that accelerates it and bears its weight, where it acts, and the rate of its spin.
-        let loads: Vec<_> = chain
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| {
-                let l = first + j;
-                let (mut acceleration, mut rate) = (Vector3::z() * GRAVITY, Vector3::zeros());
-                if inner {
-                    acceleration += (at(n + 1, l) - at(n, l) * 2.0 + at(n - 1, l)) / self.step.powi(2);
-                    let spins =
-                        [n - 1, n].map(|n| spin(&[turn(n, l), turn(n + 1, l)], &joint.inertia, self.step));
-                    rate = (spins[1] - spins[0]) / self.step;
-                }
-                (acceleration * joint.mass, at(n, l), rate)
-            })
-            .collect();
-        std::array::from_fn(|j| {
-            let moment: Vector3<f64> =
-                loads[j..].iter().map(|(force, place, rate)| (place - origin(j)).cross(force) + rate).sum();
-            (r * Vector3::from(posture.joints[i].axis[j])).dot(&moment)
-        })
     }
 
     /// By how much Euler's law is missed at the ends of the steps by the forces of the variables x, averaged over the two steps beside

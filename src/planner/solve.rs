@@ -468,7 +468,7 @@ impl<'a> Solve<'a> {
         if let Some((layout, x)) = settled {
             (model.layout, end.x) = (layout, x);
         }
-        let legs = BodyMotion::new(&model, &end.x, FINE).map(|body| body.samples());
+        let legs = BodyMotion::new(&model, &end.x, FINE).map(|body| body.samples(&end.x));
         Motion {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,

@@ -1,5 +1,7 @@
 """Joint speeds and torques that the planner limits, computed again with MuJoCo's kinematics of the full model."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -7,7 +9,10 @@ import pytest
 import warpgait
 from warpgait.geometry import rotation_from_wxyz
 from warpgait.kinematics import legs
-from warpgait.model import composite, find_model, indices, load_spec, stand
+from warpgait.model import composite, find_model, indices, load_robot, load_spec, stand
+from warpgait.openloop import inverse_dynamics, joint_motion, postures
+from warpgait.plan import read_plan
+from warpgait.rolling import no_rolling
 
 # Fast and up a slope, so that both limits are active.
 SCENARIO = """
@@ -46,6 +51,21 @@ def test_planned_joints_keep_their_limits_in_mujoco(known: bool, tmp_path: objec
         assert speed > 0.3 and torque > 0.3, (speed, torque)  # the legs do work
     else:
         assert max(speed, torque) > 0.9, (speed, torque)  # without the constraints, a limit is exceeded
+
+
+def test_joints_of_the_plan_are_those_of_the_full_model(walk_plan: Path) -> None:
+    plan = read_plan(walk_plan)
+    assert plan.joint_position is not None and plan.joint_torque is not None
+    model = load_robot(find_model(plan.robot.name), plan.robot.gravity)
+    index = indices(model, plan.foot_names)
+    found = postures(plan, model, index, no_rolling(plan))
+    velocity, acceleration = joint_motion(plan, model, found.qpos)
+    _, torque = inverse_dynamics(plan, model, index, found.qpos, velocity, acceleration)
+    # The posture's fixed-point iteration leaves 0.2 mm.
+    assert np.abs(found.qpos[:, index.qpos] - plan.joint_position).max() < 5e-3
+    off = np.abs(torque - plan.joint_torque)[1:-1] / index.torque_limit
+    assert off.max() < 0.005, off.max()
+    assert (np.abs(torque) / index.torque_limit).max() > 0.3  # the legs do work
 
 
 def without_legs(robot: str) -> str:

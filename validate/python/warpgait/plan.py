@@ -52,6 +52,8 @@ _FLOATS: dict[str, tuple[str | int, ...]] = {
 }
 # The same for members that only plans have whose legs have mass.
 _LEGS: dict[str, tuple[str | int, ...]] = {"center_of_mass_shift": ("N", 3), "angular_momentum": ("N", 3)}
+# The same, but plans of older versions do not have them.
+_JOINTS: dict[str, tuple[str | int, ...]] = {"joint_position": ("N", "E", 3), "joint_torque": ("N", "E", 3)}
 _BOOLS: dict[str, tuple[str | int, ...]] = {"foot_contact": ("N", "E"), "foot_adhesive": ("E",)}
 
 
@@ -107,6 +109,8 @@ class Plan:
         Array | None
     )  # (N, 3) from where it is in the trunk at the nominal stance, base frame; None: massless legs
     angular_momentum: Array | None  # (N, 3) of trunk and legs about the center of mass, world, kg m²/s; None: massless legs
+    joint_position: Array | None  # (N, E, 3) from the base down, rad; None: massless legs, or a plan of an older version
+    joint_torque: Array | None  # (N, E, 3) of the motors, N m; None likewise
     terrain: Heightfield
     terrain_raw: Heightfield | None  # before smoothing, where the input was a raster and the plan is for the smoothed ground
     robot: PlannedRobot
@@ -274,6 +278,8 @@ def read_plan(path: str | Path) -> Plan:
     values |= {m: check.bools(m, s) for m, s in _BOOLS.items()}
     massive = any(m in check.arrays for m in _LEGS)
     values |= {m: check.floats(m, s) if massive else None for m, s in _LEGS.items()}
+    jointed = any(m in check.arrays for m in _JOINTS)
+    values |= {m: check.floats(m, s) if jointed else None for m, s in _JOINTS.items()}
 
     t = values["t"]
     if len(t) < 3 or abs(t[0]) > _START or t[-1] <= 0 or np.ptp(np.diff(t)) > _UNIFORM * t[-1] / (len(t) - 1):
