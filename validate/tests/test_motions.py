@@ -262,14 +262,10 @@ def test_a_mujoco_scene_holds_the_motion_and_the_ground(write: Any, expected: Ex
         assert 5.0 - down == pytest.approx(float(ground.height([x, y])), abs=2e-3) and scene.geom(int(hit[0])).name == "ground"
 
 
-def test_mcap_is_read_by_its_own_reader(write: Any, expected: Expected) -> None:
-    reader = pytest.importorskip("mcap_ros2.reader")
-    path, motion = write("mcap", rate=50.0)
-    found: dict[str, list[Any]] = {}
-    for message in reader.read_ros2_messages(path):
-        found.setdefault(message.channel.topic, []).append(message.ros_msg)
+def require_messages(found: dict[str, list[Any]], motion: Motion, expected: Expected) -> None:
+    """Refuse messages of ROS by topic that do not say what the plan says at 50 Hz."""
     joints = np.array([m.position for m in found["/joint_states"]])
-    assert found["/joint_states"][0].name == list(motion.joint_names)
+    assert list(found["/joint_states"][0].name) == list(motion.joint_names)
 
     def moving(name: str) -> tuple[Array, Array]:
         frames = [next(f for f in m.transforms if f.child_frame_id == name).transform for m in found["/tf"]]
@@ -290,20 +286,76 @@ def test_mcap_is_read_by_its_own_reader(write: Any, expected: Expected) -> None:
     cloud = found["/ground/points"][0]
     points = np.frombuffer(bytes(cloud.data), np.float32).reshape(cloud.height, cloud.width, 3)
     np.testing.assert_allclose(points[..., 2], expected.plan.terrain.heights, atol=1e-6)
+    assert len(found["/robot"][0].markers) > 20 and len(found["/forces"]) == len(motion.t)
+
+
+def test_mcap_is_read_by_its_own_reader(write: Any, expected: Expected) -> None:
+    reader = pytest.importorskip("mcap_ros2.reader")
+    path, motion = write("mcap", rate=50.0)
+    found: dict[str, list[Any]] = {}
+    for message in reader.read_ros2_messages(path):
+        found.setdefault(message.channel.topic, []).append(message.ros_msg)
+    require_messages(found, motion, expected)
     with path.open("rb") as file:
         own = importlib.import_module("mcap.reader").make_reader(file)
         facts = next(m for m in own.iter_metadata() if m.name == "warpgait").metadata["facts"]
     require_facts(json.loads(facts), "mcap", expected.plan)
 
 
-def test_the_grid_map_in_an_mcap_is_the_ground(write: Any, expected: Expected, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["rosbag1", "rosbag2"])
+def test_bags_are_read_by_rosbags(write: Any, expected: Expected, name: str) -> None:
+    highlevel = pytest.importorskip("rosbags.highlevel", reason='pip install "warpgait[ros]"')
+    path, motion = write(name, rate=50.0)
+    found: dict[str, list[Any]] = {}
+    with highlevel.AnyReader([path]) as reader:
+        for connection, at, content in reader.messages():
+            message = reader.deserialize(content, connection.msgtype)
+            found.setdefault(connection.topic, []).append(message)
+            if connection.topic == "/tf":
+                stamp = message.transforms[0].header.stamp
+                assert stamp.sec * 10**9 + stamp.nanosec == at
+    require_messages(found, motion, expected)
+    require_facts(json.loads(found["/warpgait/facts"][0].data), name, expected.plan)
+
+
+@pytest.mark.parametrize("name", ["mcap", "rosbag1", "rosbag2"])
+def test_the_grid_map_in_a_recording_is_the_ground(write: Any, expected: Expected, tmp_path: Path, name: str) -> None:
     pytest.importorskip("mcap"), pytest.importorskip("rosbags")
-    path, _ = write("mcap", rate=10.0)
+    path, _ = write(name, rate=10.0)
     from warpgait.terrain import convert
 
     convert(path, "/ground", "elevation", -1, tmp_path / "back.npz")
     with np.load(tmp_path / "back.npz") as back:
         np.testing.assert_allclose(back["heights"][::-1, ::-1].T, expected.plan.terrain.heights, atol=1e-6)
+
+
+def test_rerun_is_read_by_its_own_reader(write: Any, expected: Expected) -> None:
+    reader = pytest.importorskip("rerun.chunk", reason='pip install "warpgait[rerun]"')
+    path, motion = write("rerun", rate=50.0)
+    found: dict[str, dict[str, Any]] = {}
+    for chunk in reader.RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        columns = {name.rpartition(":")[2]: batch.column(name) for name in batch.schema.names}
+        found.setdefault(chunk.entity_path, {}).update(columns)
+
+    def numbers(entity: str, component: str) -> Array:
+        return np.array(found[f"/{entity}"][component].to_pylist(), float)[:, 0]
+
+    np.testing.assert_allclose([t.total_seconds() for t in found["/world/robot/base"]["time"].to_pylist()], motion.t, atol=1e-6)
+    position = numbers("world/robot/base", "translation")
+    quaternion = np.roll(numbers("world/robot/base", "quaternion"), 1, axis=-1)
+    joints = np.stack([numbers(f"joint_position/{joint}", "scalars") for joint in motion.joint_names], -1)
+    expected.require(50, quaternion, position, joints)
+    reference = expected.at(50)
+    for e, foot in enumerate(expected.plan.foot_names):
+        forces = np.stack([numbers(f"force/{foot}/{axis}", "scalars") for axis in "xyz"], -1)
+        np.testing.assert_allclose(forces, reference.force[:, e], atol=NEAR)
+        np.testing.assert_allclose(numbers(f"world/feet/{foot}", "origins"), motion.contact_position[:, e], atol=NEAR)
+    points = np.array(found["/world/ground"]["vertex_positions"].to_pylist()[0])
+    np.testing.assert_allclose(points[:, 2], expected.plan.terrain.heights.ravel(), atol=NEAR)
+    corners = points[np.array(found["/world/ground"]["triangle_indices"].to_pylist()[0])]
+    assert (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 0).all()
+    require_facts(json.loads(found["/facts"]["text"].to_pylist()[0][0]), "rerun", expected.plan)
 
 
 def test_usd_is_read_by_its_own_library(write: Any, expected: Expected) -> None:

@@ -5,7 +5,7 @@ A new format is a file here with a `Format`, an entry in `FORMATS`, a row in doc
 
 from __future__ import annotations
 
-from . import amp, isaaclab, lerobot, locomujoco, mcap, mjcf, mjlab, tables, usd
+from . import amp, isaaclab, lerobot, locomujoco, mcap, mjcf, mjlab, rerun, rosbag, tables, usd
 from .format import Format
 from .motion import Motion
 from .sampling import motion_of_plan, motion_of_replay
@@ -23,6 +23,9 @@ FORMATS: dict[str, Format] = {
         lerobot.FORMAT,
         mjcf.FORMAT,
         mcap.FORMAT,
+        rosbag.ROS_1,
+        rosbag.ROS_2,
+        rerun.FORMAT,
         usd.FORMAT,
     )
 }

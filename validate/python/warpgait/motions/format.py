@@ -33,6 +33,7 @@ class Format:
     rate: float | None = None  # Hz, if no other is asked for; none: the source's own
     joints: bool = True  # needs joint angles
     ground: bool = False  # the ground is inside; else it lies beside, as NAME.ground.npz
+    extra: str = "export"  # of the package warpgait, with which the modules that it needs come
     files: tuple[str, ...] = field(default=())  # in the folder that the format is; none: it is one file
 
     def outputs(self, target: Path) -> list[Path]:
@@ -53,7 +54,9 @@ class Format:
             return importlib.import_module(module)
         except ImportError as error:
             name = package or module.split(".")[0]
-            raise InputError(f'--to {self.name} needs {name}: pip install "warpgait[export]", or pip install {name}') from error
+            raise InputError(
+                f'--to {self.name} needs {name}: pip install "warpgait[{self.extra}]", or pip install {name}'
+            ) from error
 
 
 def write_npz(target: Path, members: Members) -> None:
