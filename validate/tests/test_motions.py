@@ -210,6 +210,16 @@ def test_locomujoco_has_the_members_that_its_loader_knows(write: Any, expected: 
         assert data["cvel"].shape == (len(qpos), 14, 6) and data["site_xmat"].shape == (len(qpos), 4, 9)
 
 
+def test_locomujoco_is_read_by_its_own_loader(write: Any, expected: Expected) -> None:
+    reason = "pip install jax flax trimesh mujoco-mjx; pip install --no-deps loco-mujoco"
+    own = pytest.importorskip("loco_mujoco.trajectory.dataclasses", reason=reason, exc_type=ImportError)
+    path, motion = write("locomujoco")
+    found = own.Trajectory.load(str(path), backend=np)
+    assert found.info.joint_names == ["root", *motion.joint_names] and found.info.frequency == 100
+    qpos = np.asarray(found.data.qpos)
+    expected.require(100, qpos[:, 3:7], qpos[:, :3], qpos[:, 7:])
+
+
 def test_lerobot_as_version_3_is_laid_out(write: Any, expected: Expected) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     path, motion = write("lerobot")
@@ -240,6 +250,16 @@ def test_lerobot_as_version_3_is_laid_out(write: Any, expected: Expected) -> Non
     tasks = parquet.read_table(path / "meta/tasks.parquet")
     pandas = json.loads(tasks.schema.metadata[b"pandas"])
     assert tasks[pandas["index_columns"][0]].to_pylist() == episodes[0]["tasks"]
+
+
+def test_lerobot_is_read_by_the_reader_of_rerun(write: Any, expected: Expected) -> None:
+    reader = pytest.importorskip("rerun.experimental", reason='pip install "warpgait[rerun]"')
+    path, _ = write("lerobot")
+    chunks = [
+        chunk.to_record_batch() for chunk in reader.LeRobotReader(path).stream(0) if chunk.entity_path == "/observation.state"
+    ]
+    state = np.array(next(chunk for chunk in chunks if chunk.num_rows > 1).column("Scalars:scalars").to_pylist())
+    expected.require(50, state[:, 3:7], state[:, :3], state[:, 13:25], SINGLE)
 
 
 def test_a_mujoco_scene_holds_the_motion_and_the_ground(write: Any, expected: Expected) -> None:
