@@ -1,12 +1,13 @@
 //! Ground with edges: planned on patches, checked against the raw ground; what cannot be walked is refused before the NLP.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 
 use crate::common::solved;
 use warpgait::check::check;
 use warpgait::pipeline::Prepared;
 use warpgait::plan::Plan;
-use warpgait::scenario::load_text;
+use warpgait::scenario::{load, load_text};
 
 /// A short walk over a formula with edges.
 fn scenario(robot: &str, formulation: &str, expression: &str, goal: f64) -> String {
@@ -149,4 +150,12 @@ fn short_treads_get_more_steps() {
     };
     let [stairs, flat] = ["0.15*max(0, min(5, 1 + floor((x - 0.6)/0.32)))", "0*x"].map(steps);
     assert!(stairs > flat, "{stairs} steps on the stairs and {flat} on the flat");
+}
+
+#[test]
+fn a_robot_with_a_short_reach_finds_footholds_on_stairs() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/stairs.toml");
+    let loaded = load(&file, &["robot.name=anymal_b".to_owned()]).expect("a scenario");
+    let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(()));
+    assert!(prepared.is_ok(), "{}", prepared.err().map(|error| error.to_string()).unwrap_or_default());
 }

@@ -172,7 +172,8 @@ impl<'a> BasePath<'a> {
 
     /// How a foot moves after a fraction u of the way.
     pub fn foot_motion(&self, foot: usize, u: f64) -> FootMotion {
-        let step = (PROBES / self.length).min(0.5);
+        // Over as much as the foot reaches: on stairs, the base pitches from one probe to the next.
+        let step = (self.model.reach[foot].half_size[0] / self.length).min(0.5);
         let nominal = self.model.nominal[foot];
         let place = |u: f64| {
             let pose = self.pose_on_way(u);
@@ -202,12 +203,11 @@ impl<'a> BasePath<'a> {
                 // How far the foothold is out of the box, m.
                 let out = |n: usize| {
                     let pose = &poses[n];
-                    let local =
-                        pose.rotation.tr_mul(&(Vector3::new(*x, *y, pose.position.z) - pose.position));
-                    let beyond = |d: usize| {
-                        ((local[d] - reach.center[d]).abs() - (1.0 - REACH_MARGIN) * reach.half_size[d])
-                            .max(0.0)
-                    };
+                    // Horizontally from the middle of the box, which is ahead of or behind the base where that is pitched.
+                    let middle = pose.position + pose.rotation * Vector3::from(reach.center);
+                    let local = pose.rotation.tr_mul(&Vector3::new(x - middle.x, y - middle.y, 0.0));
+                    let beyond =
+                        |d: usize| (local[d].abs() - (1.0 - REACH_MARGIN) * reach.half_size[d]).max(0.0);
                     beyond(0).hypot(beyond(1))
                 };
                 let outs: Vec<f64> = (0..=count).map(out).collect();
