@@ -27,10 +27,13 @@ const SHIPPED: &[(&str, &str)] = &[
     ("laikago", include_str!("../robots/laikago.toml")),
     ("monoped_towr", include_str!("../robots/monoped_towr.toml")),
     ("solo12", include_str!("../robots/solo12.toml")),
+    ("solo8", include_str!("../robots/solo8.toml")),
 ];
 
 /// Least half of an edge of a reach box, m, for a robot of ANYmal's size: more than the planner's margins take off it.
 pub const LEAST_REACH: f64 = 0.02;
+/// The same for the width of the box of a leg of two joints, whose foot moves in a plane: its play there.
+pub const LEAST_PLAY: f64 = 0.002;
 /// Standing height of the ANYmals, m; sizes of robots are multiples of the step.
 const ANYMAL_HEIGHT: f64 = 0.43;
 const SIZE_STEP: f64 = 0.05;
@@ -87,6 +90,11 @@ impl Foot {
     /// The leg, if the file describes it. (A robot whose file describes a leg that cannot be is not loaded.)
     pub fn leg(&self) -> Option<Leg> {
         self.leg.as_ref().and_then(|leg| leg.build(self.nominal).ok())
+    }
+
+    /// Whether the foot moves in a plane of the base only.
+    pub fn is_sagittal(&self) -> bool {
+        self.leg.as_ref().is_some_and(LegSpec::is_sagittal)
     }
 }
 
@@ -204,6 +212,11 @@ impl Robot {
         Body::new(self.mass, Matrix3::from_fn(|i, j| self.inertia[i][j]), &legs, &nominal)
     }
 
+    /// Whether it can only go straight ahead or back: some of its feet move in planes of the base.
+    pub fn is_sagittal(&self) -> bool {
+        self.feet.iter().any(Foot::is_sagittal)
+    }
+
     /// Height of the center of mass above the feet at rest, m.
     pub fn standing_height(&self) -> f64 {
         -self.feet.iter().map(|foot| foot.nominal[2]).sum::<f64>() / self.feet.len() as f64
@@ -261,7 +274,7 @@ impl Robot {
             let what = "allowed: none larger than the sum of the other two (no body has such an inertia)";
             return refuse(format!("principal moments {:.4?} kg m², {what}", moments.as_slice()));
         }
-        let least = LEAST_REACH * robot.size().min(1.0);
+        let size = robot.size().min(1.0);
         for (i, foot) in robot.feet.iter().enumerate() {
             let key = format!("feet[{i}]");
             if foot.name.is_empty() || robot.feet[..i].iter().any(|other| other.name == foot.name) {
@@ -271,8 +284,10 @@ impl Robot {
             if !is_name(&foot.name) {
                 return Err(document.error(&format!("{key}.name"), no_name(&foot.name)));
             }
-            if let Some(axis) = (0..3).find(|&axis| foot.reach.half_size[axis] < least) {
-                let given = foot.reach.half_size[axis];
+            let least =
+                |axis: usize| size * if axis == 1 && foot.is_sagittal() { LEAST_PLAY } else { LEAST_REACH };
+            if let Some(axis) = (0..3).find(|&axis| foot.reach.half_size[axis] < least(axis)) {
+                let (given, least) = (foot.reach.half_size[axis], least(axis));
                 let what = format!(
                     "given {given}, allowed: at least {least} m; the planner keeps a margin inside the box"
                 );
@@ -392,7 +407,51 @@ mod tests {
         let next = end + anymal_c[end..].find("\n[[feet]]").unwrap();
         let two = format!("{}{}", &anymal_c[..end], &anymal_c[next..]);
         let message = changed_in(&two, "LF", "LF").unwrap_err().to_string();
-        assert!(message.contains("leg.joints: given 2"), "{message}");
+        assert!(message.contains("leg.stance: 3 angles, allowed: one for each of the 2 joints"), "{message}");
+    }
+
+    #[test]
+    fn impossible_legs_of_two_joints_are_refused() {
+        let solo8 = include_str!("../robots/solo8.toml");
+        for (from, to, expected) in [
+            (", 0.0011, ", ", 0.0005, ", "reach.half_size[1]: given 0.0005"),
+            (
+                "axis = [0.000000, 1.000000, 0.000000]",
+                "axis = [0.010000, 0.999950, 0.000000]",
+                "leg.joints: given two whose axes",
+            ),
+            ("stance = [0.9", "stance = [0.0, 0.9", "leg.stance: 3 angles, allowed: one for each of the 2"),
+            ("stance = [0.9", "stance = [-0.9", "leg.stance: puts the foot"),
+        ] {
+            let message = changed_in(solo8, from, to).expect_err(to).to_string();
+            assert!(message.contains(&format!("feet[0].{expected}")), "{message}");
+        }
+    }
+
+    /// The joint angles of a foot in its plane are those of the two joints; beside the plane, nothing breaks.
+    #[test]
+    fn a_leg_of_two_joints_inverts_its_kinematics() {
+        let robot = changed_in(include_str!("../robots/solo8.toml"), "solo8", "solo8").unwrap();
+        assert!(robot.is_sagittal() && !changed_in(SHIPPED[2].1, "LF", "LF").unwrap().is_sagittal());
+        for foot in &robot.feet {
+            let leg = foot.leg().unwrap();
+            let chain = leg.chain.unwrap();
+            let [thigh, knee] = foot.leg.as_ref().unwrap().stance.clone().unwrap()[..] else { panic!() };
+            for turn in [0.0, 0.2, -0.2] {
+                let q = [0.0, thigh + turn, knee - 0.5 * turn];
+                let contact = Vector3::from(chain.foot::<f64>(q)) - Vector3::z() * leg.foot_radius;
+                assert!((contact.y - foot.nominal[1]).abs() < 1e-4, "in its plane");
+                let posture = leg.posture::<f64>(contact.into());
+                for (found, expected) in posture.joint_angles().into_iter().zip(q) {
+                    assert!((found - expected).abs() < 2e-3, "{found} {expected}");
+                }
+                // The structure bears a force across the plane: the two joints feel nothing of it.
+                let columns = posture.jacobian();
+                assert!(columns[1][1].abs() < 1e-3 && columns[2][1].abs() < 1e-3, "{columns:?}");
+                let beside = leg.posture::<f64>([contact.x, contact.y + 0.01, contact.z]);
+                assert!(beside.joint_angles().into_iter().all(f64::is_finite));
+            }
+        }
     }
 
     /// Files of earlier versions have no joints.

@@ -279,6 +279,19 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
     }
 }
 
+/// Legs of two joints: no torque of the abduction that they lack, and thin reach boxes.
+#[test]
+fn blocks_of_legs_of_two_joints_match_differences() {
+    for formulation in ["warped", "direct", "hybrid"] {
+        let problem = problem_of("solo8", TERRAINS[4].1, formulation, "");
+        for name in ["joint speed", "joint torque"] {
+            let has = |(block, _): (&dyn Constraint, usize)| block.name() == name && block.rows() > 0;
+            assert!(problem.blocks().any(has), "{name}");
+        }
+        check(problem, &format!("solo8, {formulation}"));
+    }
+}
+
 /// The same for legs without a closed form: the abduction is not about x, and all three joints have rows of speed.
 #[test]
 fn blocks_of_legs_with_other_axes_match_differences() {

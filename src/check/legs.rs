@@ -80,7 +80,20 @@ impl Leg {
                 inertia: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]],
             }
         });
-        Some(Self { joints: joints.collect(), foot: spec.foot?, radius: spec.foot_radius })
+        let mut joints: Vec<Joint> = joints.collect();
+        if let [first, _] = &mut joints[..] {
+            // By a massless joint about x at the hip, the foot may be beside the plane of a leg of two joints.
+            let abduction = Joint {
+                position: first.position,
+                axis: [1.0, 0.0, 0.0],
+                mass: 0.0,
+                center: [0.0; 3],
+                inertia: [[0.0; 3]; 3],
+            };
+            first.position = [0.0; 3];
+            joints.insert(0, abduction);
+        }
+        Some(Self { joints, foot: spec.foot?, radius: spec.foot_radius })
     }
 
     /// At the joint angles q.
@@ -123,6 +136,15 @@ impl Leg {
     }
 }
 
+/// The joint angles of a leg's nominal stance, with that of the joint about x that a leg of two joints lacks; zero where there are none.
+fn stance(leg: &LegSpec) -> [f64; 3] {
+    match leg.stance.as_deref() {
+        Some(&[a, b, c]) => [a, b, c],
+        Some(&[a, b]) => [0.0, a, b],
+        _ => [0.0; 3],
+    }
+}
+
 /// Σ m c of links, kg m.
 fn moment(links: &[Placed]) -> [f64; 3] {
     links.iter().fold([0.0; 3], |sum, link| add(sum, scale(link.mass, link.center)))
@@ -142,9 +164,9 @@ impl BodyMotion {
             );
         };
         if legs.iter().any(|leg| leg.joints.len() != 3) {
-            return Err("meta.robot.legs: a leg has three joints".into());
+            return Err("meta.robot.legs: a leg has two or three joints".into());
         }
-        let mut angles: Vec<[f64; 3]> = robot.legs.iter().map(|leg| leg.stance.unwrap_or_default()).collect();
+        let mut angles: Vec<[f64; 3]> = robot.legs.iter().map(stance).collect();
         let Some(trunk) = trunk(robot, &legs, &mut angles) else {
             return Err(
                 "meta.robot.legs: do not stand at their nominal places, or weigh more than the robot".into(),
@@ -180,8 +202,7 @@ impl BodyMotion {
             }
             if !found {
                 // Out of reach: no law that needs the posture holds.
-                (here, angles) =
-                    ([0.0; 3], robot.legs.iter().map(|leg| leg.stance.unwrap_or_default()).collect());
+                (here, angles) = ([0.0; 3], robot.legs.iter().map(stance).collect());
             }
             shift[n] = if found { here } else { [f64::NAN; 3] };
             all_angles.extend(angles.iter().copied());

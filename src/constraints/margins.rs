@@ -9,7 +9,8 @@ pub const REACH_STANDING: f64 = 0.001;
 pub const REACH_SWITCHING: f64 = 0.009;
 /// Off the reach box in swing, or where a foot may swing, m: a foot at 50 m/s².
 pub const REACH_SWINGING: f64 = 0.015;
-const _: () = assert!(REACH_SWINGING < crate::robot::LEAST_REACH, "no reach box may vanish");
+/// Most that is taken off a reach box, as a fraction of its half size: no box may vanish, not even that of a foot that moves in a plane.
+pub const REACH_FRACTION: f64 = 0.5;
 /// On top of `motion.base_clearance`, m: only some points of the underside have rows, and only at some samples.
 pub const BASE_CLEARANCE: f64 = 0.01;
 /// Between knee or shank and the ground, m: for what happens between the samples, and the ground's curvature across the shank.

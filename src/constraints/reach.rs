@@ -69,8 +69,9 @@ impl Constraint for Reach {
             let reach = &model.reach[i];
             let margin = model.size * margin(model, i, at);
             for c in 0..3 {
-                lower[3 * r + c] = reach.center[c] - reach.half_size[c] + margin;
-                upper[3 * r + c] = reach.center[c] + reach.half_size[c] - margin;
+                let half = (reach.half_size[c] - margin).max(margins::REACH_FRACTION * reach.half_size[c]);
+                lower[3 * r + c] = reach.center[c] - half;
+                upper[3 * r + c] = reach.center[c] + half;
             }
         }
     }

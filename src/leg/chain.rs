@@ -35,7 +35,26 @@ pub struct Joint {
     pub inertia: Matrix3<f64>,
 }
 
-/// The joints of a leg from the base to the foot.
+impl Joint {
+    /// The abduction that a leg of two joints does not have: a massless joint about x, which no plan turns on purpose.
+    ///
+    /// The foot of such a leg moves in a plane, and a plan keeps it there within the play of its reach box. By this joint, the leg has a
+    /// posture for every place of the foot all the same.
+    pub fn missing_abduction(position: Vector3<f64>) -> Self {
+        Self {
+            position,
+            axis: Vector3::x(),
+            range: [0.0; 2],
+            speed_limit: f64::INFINITY,
+            torque_limit: f64::INFINITY,
+            mass: 0.0,
+            center: Vector3::zeros(),
+            inertia: Matrix3::zeros(),
+        }
+    }
+}
+
+/// The joints of a leg from the base to the foot; of a leg of two joints, the first is [`Joint::missing_abduction`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chain {
     /// From the base down.

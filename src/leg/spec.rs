@@ -68,8 +68,10 @@ pub struct LegSpec {
     pub foot: Option<[f64; 3]>,
     /// The joint angles that put the foot into its nominal place, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stance: Option<[f64; 3]>,
-    /// The joints from the base down. Vectors are in axes parallel to the base's at zero joint angles.
+    #[schemars(length(min = 2, max = 3))]
+    pub stance: Option<Vec<f64>>,
+    /// The joints from the base down: three, or two about the base's y axis. Vectors are in axes parallel to the base's at zero joint
+    /// angles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 3))]
     pub joints: Vec<JointSpec>,
@@ -138,7 +140,7 @@ impl LegSpec {
             (Some(chain), _) => self.of_chain(chain, nominal)?,
             (None, Some(closed)) => self.of_closed_form(closed),
             (None, None) => {
-                return bad("joints", "missing; a leg has three joints, from the base to the foot");
+                return bad("joints", "missing; a leg has two or three joints, from the base to the foot");
             }
         };
         if let (Some(_), Some(closed)) = (&leg.chain, &closed) {
@@ -232,27 +234,52 @@ impl LegSpec {
         for (j, spec) in self.joints.iter().enumerate() {
             joints.push(spec.build().map_err(|e| BadLeg { key: format!("joints[{j}].{}", e.key), ..e })?);
         }
-        let count = joints.len();
-        match joints.try_into() {
-            Ok(joints) => Ok(Some(Chain { joints, foot: foot.into() })),
-            Err(_) => {
-                bad("joints", format!("given {count}, allowed: three joints, from the base to the foot"))
+        let joints = match joints[..] {
+            [first, second] => {
+                let hip = Joint::missing_abduction(first.position);
+                [hip, Joint { position: Vector3::zeros(), ..first }, second]
             }
-        }
+            [first, second, third] => [first, second, third],
+            _ => {
+                let count = joints.len();
+                return bad(
+                    "joints",
+                    format!("given {count}, allowed: two or three joints, from the base to the foot"),
+                );
+            }
+        };
+        Ok(Some(Chain { joints, foot: foot.into() }))
     }
 
-    fn of_chain(&self, chain: Chain, nominal: [f64; 3]) -> Result<Leg, BadLeg> {
-        let Some(stance) = self.stance else {
+    /// Whether the foot moves in a plane only: a leg of two joints.
+    pub fn is_sagittal(&self) -> bool {
+        self.joints.len() == 2
+    }
+
+    /// The angles of the chain's joints in the nominal stance, rad.
+    fn stance(&self) -> Result<[f64; JOINTS], BadLeg> {
+        let Some(stance) = &self.stance else {
             return bad("stance", "missing; the joint angles that put the foot into its nominal place, rad");
         };
-        for (joint, (spec, angle)) in chain.joints.iter().zip(self.joints.iter().zip(stance)) {
+        if stance.len() != self.joints.len() {
+            let what =
+                format!("{} angles, allowed: one for each of the {} joints", stance.len(), self.joints.len());
+            return bad("stance", what);
+        }
+        for (joint, angle) in self.joints.iter().zip(stance) {
             let [least, greatest] = joint.range;
-            if !(least..=greatest).contains(&angle) {
+            if !(least..=greatest).contains(angle) {
                 let what =
-                    format!("{angle} rad for {}, allowed: its range, {least} to {greatest}", spec.name);
+                    format!("{angle} rad for {}, allowed: its range, {least} to {greatest}", joint.name);
                 return bad("stance", what);
             }
         }
+        let missing = JOINTS - stance.len();
+        Ok(std::array::from_fn(|j| if j < missing { 0.0 } else { stance[j - missing] }))
+    }
+
+    fn of_chain(&self, chain: Chain, nominal: [f64; 3]) -> Result<Leg, BadLeg> {
+        let stance = self.stance()?;
         let lowered = Vector3::from(nominal) + Vector3::z() * self.foot_radius;
         let off = (Vector3::from(chain.foot(stance)) - lowered).norm();
         let length = chain.joints[1].position.norm() + chain.joints[2].position.norm() + chain.foot.norm();
@@ -264,6 +291,10 @@ impl LegSpec {
             return bad("stance", what);
         }
         let planar = Planar::of_chain(&chain, stance, self.foot_radius).map(Kinematics::Planar);
+        if planar.is_none() && self.is_sagittal() {
+            let what = "given two whose axes are not the base's y axis, allowed: two about y (pitch and pitch), or three about any axes";
+            return bad("joints", what);
+        }
         let serial = || Serial::new(&chain, stance, self.foot_radius).map(Kinematics::Serial);
         let Some(kinematics) = planar.or_else(serial) else {
             return bad("foot", "lies on the axis of the last joint, which cannot move it");

@@ -10,6 +10,7 @@ use super::format::{Formulation, Scenario};
 use super::gait_kind::GaitKind;
 use super::map::MapMethod;
 use super::motion::{Law, Legs};
+use super::sagittal;
 use super::sequence;
 use super::terrain::TerrainSpec;
 use super::way;
@@ -38,6 +39,7 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     law(document, scenario)?;
     if let Some(robot) = robot {
         legs(document, scenario, robot)?;
+        sagittal::check(document, scenario, robot)?;
     }
     condition_checks::check(document, scenario, robot)?;
     map(document, scenario)?;

@@ -18,6 +18,7 @@ mod keep_out;
 mod load;
 mod map;
 mod motion;
+mod sagittal;
 mod section;
 mod sequence;
 mod solver;

@@ -41,7 +41,7 @@ struct Search {
     cost: Vec<f64>,
 }
 
-/// The bends of a scenario's way; all empty where it can go straight, and where nothing leads around either.
+/// The bends of a scenario's way; all empty where it can go straight, where nothing leads around either, and for a robot that cannot turn.
 pub(super) fn bends(
     scenario: &Scenario,
     robot: &Robot,
@@ -55,7 +55,7 @@ pub(super) fn bends(
         .chain([scenario.goal.position])
         .collect();
     let max_slope = scenario.contact.max_slope;
-    if contact.is_none() && keep_out.is_none() && max_slope.is_none() {
+    if robot.is_sagittal() || contact.is_none() && keep_out.is_none() && max_slope.is_none() {
         return vec![Vec::new(); places.len() - 1];
     }
     let stands = |place: [f64; 2]| {

@@ -170,12 +170,84 @@ def test_an_output_never_replaces_the_input(tmp_path: Path, capsys: pytest.Captu
     assert "pup.xml" in capsys.readouterr().err and path.read_text() == pup()
 
 
+def test_an_mjcf_may_include_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, speed = tmp_path / "pup.xml", ["--speed-limit", "10"]
+    (tmp_path / "motors.xml").write_text("<mujoco><actuator>" + pup().split("<actuator>")[1])
+    path.write_text(pup().split("<actuator>")[0] + '<include file="motors.xml"/></mujoco>')
+    found = importer.read(path, importer.arguments([str(path), *speed]))
+    assert [link.limits.torque for link in found.legs[0].links] == [20, 20, 20]
+    (tmp_path / "motors.xml").unlink()
+    assert importer.main([str(path), "-o", str(tmp_path / "out"), *speed]) == 2
+    message = capsys.readouterr().err
+    assert "pup.xml" in message and "motors.xml" in message and message.count("\n") == 1, message
+
+
+def test_a_closed_loop_of_an_mjcf_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "pup.xml"
+    loop = '<equality><connect name="bar" body1="fl_c" body2="fr_c" anchor="0 0 0"/></equality></mujoco>'
+    path.write_text(pup().replace("</mujoco>", loop))
+    assert importer.main([str(path), "-o", str(tmp_path / "out"), "--speed-limit", "10"]) == 2
+    message = capsys.readouterr().err
+    assert '"bar"' in message and "closed loops" in message and message.count("\n") == 1, message
+
+
+@pytest.mark.parametrize("forward", ["x", "y"])
+def test_a_robot_with_legs_of_two_joints(forward: str, tmp_path: Path) -> None:
+    text = fixed(URDF, ".._roll")
+    if forward == "y":  # the same robot, turned in its base frame
+        turned = '<link name="mount"/><joint name="turn" type="fixed"><origin rpy="0 0 1.5707963267948966"/><parent link="mount"/><child link="trunk"/></joint>'
+        text = text.replace('<link name="trunk">', turned + '<link name="trunk">', 1)
+    (tmp_path / "dog.urdf").write_text(text)
+    assert importer.main([str(tmp_path / "dog.urdf"), "-o", str(tmp_path / "dog"), "--quiet", "--forward", forward]) == 0
+    robot = tomllib.loads((tmp_path / "dog.toml").read_text())
+    model = load_spec(tmp_path / "dog.xml").compile()
+    index = indices(model, feet_of(model))
+    assert index.qpos.shape == (4, 2) and model.nu == 8
+    data = mujoco.MjData(model)
+    stand(model, data)
+    center = data.xpos[index.base] + composite(model, data).center_of_mass
+    for e, found in enumerate(legs(model, index.feet)):
+        foot = robot["feet"][e]
+        assert [j["axis"] for j in foot["leg"]["joints"]] == [[0, -1, 0], [0, 1, 0]]
+        assert foot["nominal"][1] == pytest.approx(0.13 * SIDES[index.joint_names[2 * e][:2]][1], abs=1e-3)
+        # The foot keeps to its plane; along and up it has room.
+        box = foot["reach"]
+        assert box["center"][1] == pytest.approx(foot["nominal"][1], abs=1e-3) and box["half_size"][1] < 0.005
+        assert min(box["half_size"][0], box["half_size"][2]) > 0.04
+        q, possible = found.inverse(data.site_xpos[index.site[e]] - data.xpos[index.base])
+        assert possible and q == pytest.approx(data.qpos[index.qpos[e]], abs=1e-6)
+        assert data.site_xpos[index.site[e]] - center - [0, 0, 0.02] == pytest.approx(foot["nominal"], abs=1e-3)
+        assert not found.inverse(data.site_xpos[index.site[e]] - data.xpos[index.base] + [0, 0.05, 0])[1]
+
+
+def short() -> str:
+    """A robot so short that front and hind thighs hit each other where the knees bend toward each other."""
+    text = pup().replace('range="-2.6 -0.6"', 'range="-2.6 2.6"').replace('size="0.01" fromto', 'size="0.03" fromto')
+    return text.replace('"0.2 ', '"0.14 ').replace('"-0.2 ', '"-0.14 ')
+
+
+def test_a_computed_stance_keeps_the_legs_apart(tmp_path: Path) -> None:
+    path = tmp_path / "short.xml"
+    knees = {}
+    for name, text in (("long", short().replace('"0.14 ', '"0.3 ').replace('"-0.14 ', '"-0.3 ')), ("short", short())):
+        path.write_text(text)
+        found = importer.build(path, name, importer.arguments([str(path), "--speed-limit", "10"]))
+        knees[name] = np.sign([leg.stance[2] for leg in found.robot.legs]).tolist()
+        assert any("hit each other" in note for note in found.skeleton.notes) == (name == "short")
+    assert knees == {"long": [-1, -1, 1, 1], "short": [-1, -1, -1, -1]}
+
+
 def swap(old: str, new: str, count: int = 1) -> Callable[[str], str]:
     def change(text: str) -> str:
         assert old in text, old
         return text.replace(old, new, count)
 
     return change
+
+
+def fixed(text: str, names: str) -> str:
+    """The URDF with the joints of a pattern fixed."""
+    return re.sub(rf'(<joint name="{names}" type=)"revolute"(.*?)<limit[^>]*/>', r'\1"fixed"\2', text)
 
 
 LOOP = joint("loop", "fr_calf", "fl_calf", "0 0 0", "0 1 0", -1, 1)
@@ -210,10 +282,21 @@ BAD = {
     "sliding joint": (swap('name="fl_knee" type="revolute"', 'name="fl_knee" type="prismatic"'), ['"fl_knee"'], "no hinge"),
     "unknown type": (swap('name="fl_knee" type="revolute"', 'name="fl_knee" type="hinge"'), ['"fl_knee"'], "its type"),
     "mimic": (swap('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="fl_pitch"/>'), ['"fl_knee"'], "mimic"),
-    "two joints in a leg": (
-        lambda text: re.sub(r'(<joint name="fl_roll" type=)"revolute"(.*?)<limit[^>]*/>', r'\1"fixed"\2', text, count=1),
-        ['"fl_calf"'],
-        "has 2 joints",
+    "a leg of two joints and three of three": (lambda text: fixed(text, "fl_roll"), ['"fl_foot" 2', '"fr_foot" 3'], "--freeze"),
+    "a leg of one joint": (lambda text: fixed(fixed(text, "fl_roll"), "fl_pitch"), ['"fl_calf"', "fl_knee"], "has 1 joints"),
+    "two joints that are no pitch and pitch": (
+        lambda text: fixed(text, ".._pitch"),
+        ['"fl_calf"', "[1.0, 0.0, 0.0]"],
+        "--forward",
+    ),
+    "zero mass": (swap('<mass value="1.0"/>', '<mass value="0.0"/>'), ['"fl_thigh"'], "mass"),
+    "continuous": (swap('name="fl_knee" type="revolute"', 'name="fl_knee" type="continuous"'), ['"fl_knee"'], "--range"),
+    "wheels": (
+        lambda text: re.sub(
+            r'(<joint name=".._end" type=)"fixed"(.*?)</joint>', r'\1"continuous"\2<axis xyz="0 1 0"/></joint>', text
+        ),
+        ['"fl_foot"', "fl_end"],
+        "has 4 joints",
     ),
     "no legs": (lambda text: text.replace('type="revolute"', 'type="fixed"'), [], "there are no legs"),
 }

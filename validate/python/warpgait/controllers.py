@@ -16,7 +16,7 @@ import numpy as np
 from .arrays import Array, Bools, Integers
 from .footing import StepOver, TouchDown, swing_progress
 from .geometry import rotation_vector
-from .model import Indices
+from .model import SAGITTAL, Indices
 from .observer import Moment, Observer
 from .reference import Reference
 from .trunk import TrunkForces
@@ -25,6 +25,8 @@ FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on
 FRICTION_USED = 0.95  # fraction of the friction that the controller uses; at the edge of the cone a foot slides
 LATENCY = 1  # control steps from a measurement until the torques that it leads to act
 EDGES = 8  # of the pyramid inside the friction cone, which has 92 % of the cone's width
+
+HELD = 10.0  # weight of such a foot's rest across its plane, before squaring
 
 _UNBOUNDED = 1e30  # DAQP's infinity
 _EQUALITY = 5  # DAQP's flags: active and immutable
@@ -125,7 +127,7 @@ class WholeBody:
         self._jacobian_rate = np.zeros((3, nv))
         self._cones = friction_cones(reference.normal, self.friction)
         self._cones_in_the_air = friction_cones(reference.normal, FRICTION_IN_THE_AIR)
-        self._last = np.zeros((E, 3))
+        self._last = np.zeros_like(index.torque_limit)
         self._acceleration = np.zeros(nv)
         self._velocity: Array | None = None
         self._data, self._period = mujoco.MjData(model), float(reference.t[1])
@@ -135,7 +137,7 @@ class WholeBody:
         self._touch_down = TouchDown(swing_progress(reference), float(reference.t[1]), *self.gains.seek)
 
     def torque(self, k: int, qpos: Array, qvel: Array, touching: Bools) -> Array:
-        """Motor torques (E, 3) N m at control step k for the measured positions (nq,) and velocities (nv,), and the feet (E,) that touch.
+        """Motor torques (E, J) N m at control step k for the measured positions (nq,) and velocities (nv,), and the feet (E,) that touch.
 
         They act a control step later, so they are computed for the state that the robot will have then. Without a solution, the torques of
         the step before are kept. Unknowns: accelerations q̈ (nv,), then the forces (3,) of each foot in stance.
@@ -158,7 +160,7 @@ class WholeBody:
         x, _, flag, _ = daqp.solve(H, gradient, C, upper, lower, sense)
         if flag >= 1 and np.isfinite(x).all():
             motors = self.index.qvel.ravel()
-            self._last = (C[6 : 6 + len(motors)] @ x + (bias - self.observer.generalized)[motors]).reshape(-1, 3)
+            self._last = (C[6 : 6 + len(motors)] @ x + (bias - self.observer.generalized)[motors]).reshape(self._last.shape)
             self._acceleration = x[: self.model.nv]
         else:
             self.failures += 1
@@ -213,10 +215,23 @@ class WholeBody:
                 rate = ref.foot_velocity[k, e] + rise_speed[e] * normal
                 wanted = ref.foot_acceleration[k, e] + g.swing[0] * (target - center) + g.swing[1] * (rate - velocity)
             rows = slice(6 + 3 * e, 9 + 3 * e)
-            self._A[rows] = J
-            self._b[rows] = wanted - self._jacobian_rate @ v
+            aside = self._aside(bool(stance), data)
+            self._A[rows] = aside @ J
+            self._b[rows] = aside @ (wanted - self._jacobian_rate @ v)
             weights += [g.weight_stance if stance else g.weight_swing] * 3
         return weights
+
+    def _aside(self, stance: bool, data: Any) -> Array:
+        """What a foot's task is multiplied with (3, 3): for legs of two joints, whose feet move in planes of the base.
+
+        In the air, nothing moves such a foot across its plane but the base, so that part of the task is left out. On the ground, the foot keeps
+        the base from moving across that plane, which no task may deny.
+        """
+        if self.index.qvel.shape[1] != SAGITTAL:
+            return np.eye(3)
+        across = data.xmat[self.index.base].reshape(3, 3)[:, 1]
+        scaled: Array = np.eye(3) + ((HELD if stance else 0.0) - 1) * np.outer(across, across)
+        return scaled
 
     def _objective(self, k: int, stance: Integers, weights: Array) -> tuple[Array, Array]:
         """Hessian and gradient of the weighted squares, for the tasks' `weights` and the feet in `stance`."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,24 +18,19 @@ import numpy as np
 
 from . import stance as stances
 from .arrays import Array
+from .assemble import Imported, assemble, assemble_freest
 from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import ensure_outputs, write_text
-from .mjcf import foot_names, order, write_mjcf
 from .model import check_mujoco
-from .robots import CentroidalRobot, derive_from, reach_of, size_in, to_toml
-from .skeleton import Leg, Link, Reader, Shape, Skeleton, find_feet, leg_of
+from .robots import CentroidalRobot, to_toml
+from .skeleton import Link, Reader, Skeleton, find_feet, leg_of
 from .text import is_name, visible
 from .urdf import Limits, read_urdf
 
 LARGEST_FILE = 64 << 20  # bytes
-CYCLE, CYCLE_LENGTH = (
-    1.2,
-    0.6125,
-)  # s, m: the cycle of ANYmal C and the length of its legs; cycles grow with the root of the length
 KEYS = ("stand", "home", "stance", "standing")  # names of keyframes that are a stance, best first
-STANCE_ROUNDS = 4  # of stance and reach boxes
-TRIM = 0.25  # of the foot's radius: a shape of the shank that is not at least this much higher than the foot's lowest point is left out
+FORWARD = {"x": 0.0, "y": np.pi / 2, "-x": np.pi, "-y": -np.pi / 2}  # rad, from x toward y
 
 
 def read(path: Path, options: argparse.Namespace) -> Skeleton:
@@ -189,9 +184,19 @@ def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
         raise InputError(
             f'{reader.path}: joint "{names[shared[0]]}" moves more than one leg; hold it still: --freeze {names[shared[0]]}'
         )
+    reader.forward = FORWARD[options.forward]
     reader.pose()
     radius = options.foot_radius
     legs = [leg_of(reader, leaf, set(wanted), radius) for leaf in leaves]
+    counts = {len(leg.links) for leg in legs}
+    if len(counts) > 1:
+        each = ", ".join(f'"{leg.foot_body}" {len(leg.links)}' for leg in legs)
+        raise InputError(
+            f"{reader.path}: the legs have different numbers of joints ({each}); hold some still: --freeze JOINT=ANGLE"
+        )
+    for flag, given in (("--speed-limit", options.speed_limit), ("--torque-limit", options.torque_limit)):
+        if given is not None and len(given) not in (1, *counts):
+            raise InputError(f"{flag}: {len(given)} numbers; allowed: 1, or {max(counts)}, one for each joint of a leg")
     legs = [replace(leg, links=[_limited(reader, link, k, options) for k, link in enumerate(leg.links)]) for leg in legs]
     largest = max(leg.radius for leg in legs)
     if any(leg.radius < 0.99 * largest for leg in legs):
@@ -206,10 +211,10 @@ def _limited(reader: Reader, link: Link, k: int, options: argparse.Namespace) ->
     for name, flag, unit in (("speed", "--speed-limit", "RAD/S"), ("torque", "--torque-limit", "NM")):
         given = options.speed_limit if name == "speed" else options.torque_limit
         if given:
-            setattr(limits, name, given[k] if len(given) == 3 else given[0])
+            setattr(limits, name, given[min(k, len(given) - 1)])
         if not (getattr(limits, name) or 0) > 0:
             raise InputError(
-                f'{reader.path}: joint "{link.joint}": the file has no {name} limit; give it: {flag} {unit}, or {flag} A,B,C for the joints of a leg from the base down'
+                f'{reader.path}: joint "{link.joint}": the file has no {name} limit; give it: {flag} {unit}, or one for each joint of a leg from the base down: {flag} A,B,…'
             )
     if limits.range is None and options.range is None:
         raise InputError(
@@ -223,102 +228,20 @@ def _limited(reader: Reader, link: Link, k: int, options: argparse.Namespace) ->
     return replace(link, limits=limits)
 
 
-def _shape_at(shape: Shape, link: Link, frame: tuple[Array, Array]) -> Shape:
-    """A shape of a link in the posture in which the link's joint is at `frame`."""
-    R, at = frame
-    return replace(shape, center=at + R @ (shape.center - link.anchor), rotation=R @ shape.rotation)
-
-
-def _cut(shape: Shape, leg: Leg) -> Shape | None:
-    """A box that took the place of a mesh, without the part of it beside and below the foot, which the foot's sphere stands for."""
-    upright = shape.kind == "box" and np.abs(shape.rotation - np.eye(3)).max() < 1e-6
-    if not upright or leg.foot[2] >= leg.links[-1].anchor[2]:
-        return shape
-    low, high = shape.center[2] - shape.size[2], shape.center[2] + shape.size[2]
-    end = leg.foot[2] + leg.radius
-    if low >= end:
-        return shape
-    if high <= end:
-        return None
-    center, size = shape.center.copy(), shape.size.copy()
-    center[2], size[2] = (high + end) / 2, (high - end) / 2
-    return replace(shape, center=center, size=size)
-
-
-def _trim(skeleton: Skeleton, leg: Leg, q: Array) -> Leg:
-    """Leave out shapes of the shank that would touch the ground with the foot."""
-    foot, frames = stances.place(leg, q)
-    last, floor = leg.links[-1], foot[2] - leg.radius
-    shapes = [_cut(s, leg) for s in last.shapes]
-    kept = [s for s in shapes if s is not None and _shape_at(s, last, frames[-1]).lowest() > floor + TRIM * leg.radius]
-    if len(kept) < len(last.shapes):
-        skeleton.notes.append(
-            f'link "{last.body}": {len(last.shapes) - len(kept)} of its shapes reach as low as the foot and are left out'
-        )
-    return replace(leg, links=[*leg.links[:-1], replace(last, shapes=kept)])
-
-
-def _trunk(base: Link, legs: list[Leg], notes: list[str]) -> Link:
-    """The base, with a box around the hips where the file has no collision shapes of it."""
-    if base.shapes:
-        return base
-    hips = np.array([leg.links[0].anchor for leg in legs])
-    low, high = hips.min(0), hips.max(0)
-    half = np.maximum((high - low) / 2, 0.05 * np.ptp(hips[:, 0]) + 0.02)
-    notes.append(f'link "{base.body}": it has no collision shapes; a box around the hips takes their place')
-    return replace(base, shapes=[Shape("box", (low + high) / 2, np.eye(3), half)])
-
-
-@dataclass(frozen=True)
-class Imported:
-    """A robot, ready to be written."""
-
-    model: str  # the text of NAME.xml
-    robot: CentroidalRobot
-    skeleton: Skeleton
-    source: str  # of the stance
-
-
 def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
-    """Read a file and derive the robot. A computed stance is then moved to the middle of the reach boxes."""
+    """Read a file and derive the robot."""
     skeleton = read(path, options)
-    if options.stance:
-        source, q = "--stance", stances.given(skeleton, options.stance)
-    else:
-        found = stances.of_key(skeleton)
-        if found is not None and not stances.stands(skeleton.legs, found):
-            skeleton.notes.append(
-                "the keyframe is not a stance, because not all of its feet are well below the hips; a stance is computed instead"
-            )
-            found = None
-        source, q = ("keyframe", found) if found is not None else ("computed", stances.computed(skeleton.legs))
-    stances.judge(skeleton, q, source)
-    feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
-    sequence = order(feet)
-    skeleton.legs = [_trim(skeleton, skeleton.legs[e], q[e]) for e in sequence]
-    skeleton.base = _trunk(skeleton.base, skeleton.legs, skeleton.notes)
-    q, feet = [q[e] for e in sequence], [feet[e] for e in sequence]
-    lengths = [stances.length(leg) for leg in skeleton.legs]
-    cycle = round(20 * CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH))) / 20
     words = options.source or f"from {path.name}"
-    names = foot_names(feet)
-
-    def model_in(q: list[Array]) -> tuple[str, Any]:
-        feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
-        height = max(leg.radius - float(foot[2]) for leg, foot in zip(skeleton.legs, feet, strict=True))
-        text = write_mjcf(skeleton, name, names, q, height, cycle, words)
-        return text, mujoco.MjSpec.from_string(text)
-
-    text, spec = model_in(q)
-    reach = reach_of(name, spec)
-    if source == "computed":
-        for _ in range(STANCE_ROUNDS):  # the boxes depend on the robot's size, and that on the stance
-            text, spec = model_in(stances.inside(skeleton.legs, q, reach.boxes))
-            if reach.size == size_in(spec):
-                break
-            reach = reach_of(name, spec)
-    # The robot file is derived from the very text of the model.
-    return Imported(text, derive_from(name, spec, reach), skeleton, source)
+    if options.stance:
+        return assemble(skeleton, name, stances.given(skeleton, options.stance), "--stance", words)
+    found = stances.of_key(skeleton)
+    if found is not None and stances.stands(skeleton.legs, found):
+        return assemble(skeleton, name, found, "keyframe", words)
+    if found is not None:
+        skeleton.notes.append(
+            "the keyframe is not a stance, because not all of its feet are well below the hips; a stance is computed instead"
+        )
+    return assemble_freest(skeleton, name, stances.computed(skeleton.legs), words)
 
 
 def _table(skeleton: Skeleton, robot: CentroidalRobot, source: str) -> list[str]:
@@ -366,31 +289,32 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
         "--stance",
         type=_numbers,
         metavar="Q,…",
-        help="joint angles of the stance, rad: three for every leg, or three for each, in the file's order",
+        help="joint angles of the stance, rad: those of one leg, for all of them, or those of each, in the file's order",
     )
     parser.add_argument(
         "--speed-limit",
         type=_numbers,
         metavar="V",
-        help="of the joints, rad/s: one, or three from the base down; replaces the file's",
+        help="of the joints, rad/s: one, or one for each joint of a leg from the base down; replaces the file's",
     )
     parser.add_argument(
         "--torque-limit",
         type=_numbers,
         metavar="T",
-        help="of the joints, N m: one, or three from the base down; replaces the file's",
+        help="of the joints, N m: one, or one for each joint of a leg from the base down; replaces the file's",
     )
     parser.add_argument("--range", type=_numbers, metavar="A,B", help="range of joints without limits, rad")
+    parser.add_argument(
+        "--forward", choices=FORWARD, default="x", help="the direction in the file's base frame that is ahead (default: x)"
+    )
     parser.add_argument("--freeze", action="append", default=[], metavar="JOINT=Q", help="hold a joint still at an angle, rad")
     parser.add_argument("--without-meshes", action="store_true", help="leave out collision shapes whose meshes are not there")
     parser.add_argument("--source", help="where the file is from and its license, for the two files")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     options = parser.parse_args(words)
-    for name, allowed in (("speed_limit", (1, 3)), ("torque_limit", (1, 3)), ("range", (2,))):
-        given = getattr(options, name)
-        if given is not None and len(given) not in allowed:
-            parser.error(f"--{name.replace('_', '-')}: {len(given)} numbers; allowed: {' or '.join(map(str, allowed))}")
+    if options.range is not None and len(options.range) != 2:
+        parser.error(f"--range: {len(options.range)} numbers; allowed: 2")
     if options.foot_radius is not None and not 1e-3 <= options.foot_radius <= 1:
         parser.error(f"--foot-radius {options.foot_radius:g}: allowed: 0.001 to 1 m")
     if options.range and options.range[0] >= options.range[1]:

@@ -15,7 +15,8 @@ from scipy.ndimage import uniform_filter1d
 from . import criteria
 from .arrays import Array, Bools, runs, since_start
 from .criteria import LEVER, Criterion, Metric
-from .model import Indices, foot_of
+from .geometry import rotation_from_wxyz
+from .model import SAGITTAL, Indices, foot_of
 from .openloop import OpenLoop
 from .plan import Plan
 from .reference import Reference
@@ -141,6 +142,17 @@ def filtered_forces(replay: Replay, reference: Reference) -> FilteredForces:
     )
 
 
+def _commanded(force: Array, replay: Replay, index: Indices) -> Array:
+    """The part of forces of feet (K, E, 3) that joints bring about: all of it but for legs of two joints, whose structure bears what is across
+    the plane of the leg.
+    """
+    if index.qvel.shape[1] != SAGITTAL:
+        return force
+    across = rotation_from_wxyz(replay.qpos[:, 3:7]).as_matrix()[:, :, 1]
+    part: Array = force - np.einsum("kec,kc->ke", force, across)[..., None] * across[:, None]
+    return part
+
+
 def _happened(layer: str, criterion: Criterion, value: float, incident: Incident | None) -> Metric:
     """A metric whose place and words are those of an incident, if there was one."""
     if incident is None:
@@ -198,7 +210,10 @@ def judge_closed_loop(
     mistaken = mismatch & ~_about_to_switch(reference, K, LANDING * index.size)
     forces = filtered_forces(replay, reference)
     difference = forces.difference
-    off_feet, off_net = np.linalg.norm(difference, axis=2) / mg, np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg
+    off_feet, off_net = (
+        np.linalg.norm(_commanded(difference, replay, index), axis=2) / mg,
+        np.linalg.norm(np.sum(difference, axis=1), axis=1) / mg,
+    )
     torque = np.abs(replay.torque)
     saturated = torque > SATURATED * index.torque_limit
     velocity = np.abs(replay.qvel[:, index.qvel])

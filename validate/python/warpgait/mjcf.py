@@ -9,7 +9,7 @@ import numpy as np
 from .arrays import Array
 from .skeleton import Leg, Link, Shape, Skeleton
 
-LINKS = ("HIP", "THIGH", "SHANK")
+LINKS = ("HIP", "THIGH", "SHANK")  # without the first in legs of two joints
 SIDES = {1: ("",), 2: ("F", "H"), 3: ("F", "M", "H"), 4: ("1", "2", "3", "4")}  # of the legs of one side, from the front
 _ALIGNED = 1e-6
 FOOT_SOFTNESS = 0.01  # s, MuJoCo's solref of a foot
@@ -60,8 +60,8 @@ def _inertial(link: Link) -> str:
 
 
 def _leg(leg: Leg, foot: str) -> list[str]:
-    lines, before = [], np.zeros(3)
-    for depth, (link, part) in enumerate(zip(leg.links, LINKS, strict=True)):
+    lines, before, depths = [], np.zeros(3), len(leg.links)
+    for depth, (link, part) in enumerate(zip(leg.links, LINKS[-depths:], strict=True)):
         space = "  " * (depth + 3)
         low, high = link.limits.range or (-np.pi, np.pi)
         lines.append(f'{space}<body name="{foot}_{part}" pos="{_numbers(link.anchor - before)}">')
@@ -69,18 +69,18 @@ def _leg(leg: Leg, foot: str) -> list[str]:
         lines.append(f"{space}  {_inertial(link)}")
         lines += [f"{space}  {_geom(shape, link.anchor)}" for shape in link.shapes]
         before = link.anchor
-    last = "  " * (len(LINKS) + 3)
+    last = "  " * (depths + 3)
     where = _numbers(leg.foot - before)
     lines.append(f'{last}<geom name="{foot}" class="foot" pos="{where}" size="{leg.radius:.6g}"/>')
     lines.append(f'{last}<site name="{foot}" class="foot" pos="{where}"/>')
-    lines += ["  " * (depth + 3) + "</body>" for depth in reversed(range(len(LINKS)))]
+    lines += ["  " * (depth + 3) + "</body>" for depth in reversed(range(depths))]
     return lines
 
 
 def write_mjcf(
     skeleton: Skeleton, name: str, feet: list[str], stance: list[Array], height: float, cycle: float, source: str
 ) -> str:
-    """The model's text; the base's origin is `height` m above the ground in the stance (E, 3)."""
+    """The model's text; the base's origin is `height` m above the ground in the stance (E, J)."""
     base, legs = skeleton.base, skeleton.legs
     joints = [link for leg in legs for link in leg.links]
     size = max(height, 0.05)

@@ -1,7 +1,7 @@
 """Full robot models: where they are found, and what the rest of the package reads from them.
 
 A model is one MJCF file, `robots/NAME.xml`. It has a free joint `root`, a body `base`, and for each foot `F` a spherical geom `F`, a site `F` at
-its center, three hinges on the way from the base to it, and a motor for each hinge. Names of bodies of that leg begin with `F`. A keyframe
+its center, three hinges on the way from the base to it (or two in all legs), and a motor for each hinge. Names of bodies of that leg begin with `F`. A keyframe
 `stand` holds the nominal stance. The custom numeric `joint_speed_limit` is in rad/s and `joint_power_limit`, if it has one, in W: one number for
 all joints, or one for each, leg by leg from the base down.
 """
@@ -23,7 +23,9 @@ from .errors import InputError
 from .settings import MUJOCO_VERSION
 from .text import is_name
 
-JOINTS = 3  # of a leg
+PITCH_ONLY = "a leg of two joints has both about the base's y axis (pitch and pitch)"
+SAGITTAL = 2  # joints of a leg whose foot moves in a plane of the base
+JOINT_COUNTS = (SAGITTAL, 3)  # of a leg; the same for all legs of a robot
 CARRIED, CARRIED_RADIUS = "carried", 0.01  # the body of a payload, which plans take for a point, and its radius of gyration, m
 ANYMAL_HEIGHT, SIZE_STEP = 0.43, 0.05  # m, of the ANYmals; sizes of robots are multiples of the step
 
@@ -85,26 +87,26 @@ class Composite:
 
 @dataclass(frozen=True)
 class Indices:
-    """Where things are in MuJoCo's arrays. E feet, in the order of `feet`."""
+    """Where things are in MuJoCo's arrays. E feet, in the order of `feet`, each with J joints."""
 
     feet: tuple[str, ...]
     joints_of: tuple[tuple[str, ...], ...]  # names of the joints of each leg, from the base to the foot
-    qpos: Integers  # (E, 3) joint positions
-    qvel: Integers  # (E, 3) joint velocities
-    actuator: Integers  # (E, 3) motors
+    qpos: Integers  # (E, J) joint positions
+    qvel: Integers  # (E, J) joint velocities
+    actuator: Integers  # (E, J) motors
     geom: list[int]  # (E,) foot spheres
     site: list[int]  # (E,) foot centers
     body: list[int]  # (E,) bodies that carry them
     base: int  # base body
     radius: float  # m, of the feet
-    torque_limit: Array  # (E, 3) N m
-    speed_limit: Array  # (E, 3) rad/s
-    power_limit: Array  # (E, 3) W; where the model does not say, torque times speed
+    torque_limit: Array  # (E, J) N m
+    speed_limit: Array  # (E, J) rad/s
+    power_limit: Array  # (E, J) W; where the model does not say, torque times speed
     size: float  # of the robot, in ANYmals
 
     @property
     def joint_names(self) -> list[str]:
-        """The 3E joints, leg by leg."""
+        """The E·J joints, leg by leg."""
         return [name for names in self.joints_of for name in names]
 
 
@@ -172,9 +174,9 @@ def leg_joints(model: Any, foot: str) -> list[int]:
         found[:0] = range(first, first + model.body_jntnum[body])
         body = int(model.body_parentid[body])
     hinges = all(model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE) for j in found)
-    if len(found) != JOINTS or not hinges:
+    if len(found) not in JOINT_COUNTS or not hinges:
         names = ", ".join(model.joint(j).name for j in found) or "none"
-        raise InputError(f"leg {foot}: its joints are {names}; the replay needs {JOINTS} hinges between base and foot")
+        raise InputError(f"leg {foot}: its joints are {names}; the replay needs two or three hinges between base and foot")
     return found
 
 
@@ -192,7 +194,7 @@ def numeric(model: Any, name: str) -> Array | None:
     return next((model.numeric(i).data.copy() for i in range(model.nnumeric) if model.numeric(i).name == name), None)
 
 
-def _by_joint(values: Array, shape: tuple[int, int], name: str) -> Array:
+def _by_joint(values: Array, shape: tuple[int, ...], name: str) -> Array:
     """One number for all joints, or one for each, as (E, J)."""
     if values.size not in (1, shape[0] * shape[1]):
         raise InputError(
@@ -205,12 +207,15 @@ def indices(model: Any, feet: tuple[str, ...]) -> Indices:
     """Look up the parts of `feet`, or name the missing one."""
     try:
         numbers = [leg_joints(model, foot) for foot in feet]
+        if len({len(leg) for leg in numbers}) > 1:
+            counts = ", ".join(f"{foot} {len(leg)}" for foot, leg in zip(feet, numbers, strict=True))
+            raise InputError(f"the legs have different numbers of joints: {counts}; the replay needs as many in all of them")
         joints = [[model.joint(j) for j in leg] for leg in numbers]
         motors = [[model.actuator(motor_of(model, j)) for j in leg] for leg in numbers]
         geoms = [model.geom(foot).id for foot in feet]
         sites, radius = [model.site(foot).id for foot in feet], float(model.geom_size[geoms[0], 0])
         torque_limit = np.array([[m.ctrlrange[1] for m in leg] for leg in motors])
-        shape = (len(feet), JOINTS)
+        shape = torque_limit.shape
         speeds, powers = numeric(model, "joint_speed_limit"), numeric(model, "joint_power_limit")
         if speeds is None:
             raise InputError("the robot model lacks the custom numeric joint_speed_limit, rad/s")

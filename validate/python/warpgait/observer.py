@@ -26,7 +26,7 @@ class Moment:
     mass_matrix: Array  # (nv, nv)
     bias: Array  # (nv,) gravity, Coriolis and passive forces
     jacobians: Array  # (E, 3, nv) of the feet's contact points
-    torque: Array  # (E, 3) N m, of the motors
+    torque: Array  # (E, J) N m, of the motors
     standing: Bools  # (E,) feet that touch the ground
 
 

@@ -35,7 +35,7 @@ class OpenLoop:
     in_ground: list[tuple[int, str]]  # sample and body of every posture that has a part other than a foot in the ground
     plan_residual: Array  # (N, 6) force N, and torque about the center of mass N m, that the plan's forces leave unexplained
     body_residual: Array  # (N, 6) the same for the full body
-    torque: Array  # (N, E, 3) N m
+    torque: Array  # (N, E, J) N m
 
 
 @dataclass(frozen=True)
@@ -148,14 +148,14 @@ def joint_motion(plan: Plan, model: Any, qpos: Array) -> tuple[Array, Array]:
 
 
 def inverse_dynamics(plan: Plan, model: Any, index: Indices, qpos: Array, qvel: Array, qacc: Array) -> tuple[Array, Array]:
-    """Wrench (N, 6) about the center of mass that the planned forces leave unexplained, and joint torques (N, E, 3).
+    """Wrench (N, 6) about the center of mass that the planned forces leave unexplained, and joint torques (N, E, J).
 
     Forces are averaged with the same hat as the accelerations. Contacts and joint limits of `model` are switched off meanwhile. The
     samples at the ends, whose accelerations are unknown, are zero.
     """
     data = mujoco.MjData(model)
     N = len(plan.t)
-    residual, torque = np.zeros((N, 6)), np.zeros((N, len(index.feet), 3))
+    residual, torque = np.zeros((N, 6)), np.zeros((N, *index.qvel.shape))
     jacobian = np.zeros((3, model.nv))
     flags = model.opt.disableflags
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT

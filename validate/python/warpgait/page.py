@@ -13,7 +13,7 @@ from . import criteria
 from .criteria import Criterion, Metric, Verdict
 from .files import write_text
 from .metrics import FORCE_WINDOW, filtered_forces
-from .model import JOINTS, Indices
+from .model import Indices
 from .svg import Line, chart, contact_bars
 from .text import escape
 from .validation import Trial, Validation
@@ -90,7 +90,7 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
         lines = [Line(t, planned[:, e], "planned", "planned"), Line(t, simulated[:, e], "actual", "replayed")]
         parts.append(chart(f"Vertical force, {foot}", "N", lines, (), end))
     known = slice(2, -2)  # the open loop has no accelerations at the ends
-    for j in range(JOINTS):
+    for j in range(v.index.torque_limit.shape[1]):
         joint = joint_title(v.index, j)
         limit = float(v.index.torque_limit[:, j].max())
         lines = [Line(v.plan.t[known], v.analysis.torque[known, e, j], f"foot{e % _COLORS} faint") for e, _ in feet]

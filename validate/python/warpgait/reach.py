@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array, Bools, Integers
-from .kinematics import Leg
+from .kinematics import Leg, PlanarLeg
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class ReachRules:
     flexion: float = float(np.deg2rad(100.0))  # rad, of the thigh from straight down
     tilt: float = float(np.deg2rad(30.0))  # rad, of the ground
     side: float = 0.03  # m, of a foot inside its own quadrant
+    play: float = 0.0025  # m, to each side of the plane in which the foot of a leg of two joints moves
     clearance: float = 0.0  # m, between foot and trunk
 
 
@@ -109,8 +110,11 @@ def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Arr
     reach = leg.span + radius
     axes = [np.arange(np.floor((h - reach) / resolution), (h + reach) / resolution) * resolution for h in leg.hip]
     axes[2] = axes[2][axes[2] < leg.hip[2]]
-    mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
     cells = np.ceil(least / resolution - 1e-9).astype(int) + 1  # rounding must not add a cell
+    if isinstance(leg, PlanarLeg) and not leg.abducts:
+        cells[1] = 2
+        axes[1] = leg.hip[1] + leg.lateral + np.array([-rules.play, rules.play])
+    mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
     bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])))
     if bounds is None:
         return None

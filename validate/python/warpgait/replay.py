@@ -33,7 +33,7 @@ class Replay:
     t: Array  # (K,)
     qpos: Array  # (K, nq)
     qvel: Array  # (K, nv)
-    torque: Array  # (K, E, 3) as applied
+    torque: Array  # (K, E, J) as applied
     com: Array  # (K, 3)
     rotation_error: Array  # (K, 3) rad, base frame
     foot: Array  # (K, E, 3) centers

@@ -106,7 +106,7 @@ def write_replay(v: Validation, target: Path) -> None:
 
     Members: `t` (K,) s; `base_position` (K,3) m, the origin of the base body (not the center of mass); `base_quaternion_wxyz` (K,4);
     `base_linear_velocity` (K,3) m/s, world; `base_angular_velocity` (K,3) rad/s, base frame; `center_of_mass` (K,3) m;
-    `q`, `qd`, `tau` (K,3E) rad, rad/s, N m in the order of `joint_names`; `foot_contact` (K,E); `foot_force` (K,E,3) N, ground on robot;
+    `q`, `qd`, `tau` (K,EJ) rad, rad/s, N m in the order of `joint_names`; `foot_contact` (K,E); `foot_force` (K,E,3) N, ground on robot;
     `foot_position` (K,E,3) m, the feet's centers; `foot_names` (E,); `plan_sha256`, of the plan file.
     """
     r, index = v.trials[0].replay, v.index

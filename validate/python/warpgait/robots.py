@@ -43,6 +43,7 @@ rough ground."""
 LEAST_FRACTIONS = (1.0, 0.8, 0.6, 0.4)  # of these edges, in this order, until the leg reaches such a box
 LEAST_ROOM = 0.01  # m, for a robot of ANYmal's size: of the nominal foot inside its box
 RESOLUTION, SIDE = 0.01, 0.03  # m, for a robot of ANYmal's size: of the grid of the reach set; of a foot inside its quadrant
+PLAY = 0.0025  # m, for a robot of ANYmal's size: of the foot of a leg of two joints to each side of its plane
 SERIAL_CELLS = 36  # along the span of a leg whose inverse kinematics is numeric
 
 MIRROR_SAMPLES, MIRROR_FRACTION = 20_000, 0.999  # random points in a mirrored reach box, and the fraction that the leg must reach
@@ -190,7 +191,8 @@ def derive_from(name: str, spec: Any, known: ReachSet | None = None) -> Centroid
     reach = known or reach_of(name, spec)
     boxes = [Box(b.center - body.center_of_mass, b.half_size) for b in reach.boxes]
     for foot, place, box in zip(feet, nominal, boxes, strict=True):
-        if (np.abs(place - box.center) > box.half_size - LEAST_ROOM * reach.size).any():
+        room = np.minimum(LEAST_ROOM * reach.size, box.half_size / 2)
+        if (np.abs(place - box.center) > box.half_size - room).any():
             raise InputError(
                 f"{name}: foot {foot}: in the stance it is at {np.round(place, 3).tolist()} m, at the edge of its reach box or outside it, "
                 f"{np.round(box.center, 3).tolist()} ± {np.round(box.half_size, 3).tolist()} m; give another stance"
@@ -225,7 +227,7 @@ class ReachSet:
 def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: float) -> ReachSet:
     """A box for each leg. A box is mirrored to the legs that reach all of its mirror image, and else computed."""
     boxes: list[Box] = []
-    rules = ReachRules(side=SIDE * size)
+    rules = ReachRules(side=SIDE * size, play=PLAY * size)
     for leg in all_legs:
         for other, box in zip(all_legs, list(boxes), strict=False):
             mirror = np.append(np.sign(leg.hip[:2] * other.hip[:2]), 1.0)

@@ -183,7 +183,7 @@ class Simulation:
         return touching
 
     def _control(self, step: int) -> Array:
-        """Set the motors and the feet's adhesion; returns the torques (E, 3) N m that act. The next ones are computed meanwhile."""
+        """Set the motors and the feet's adhesion; returns the torques (E, J) N m that act. The next ones are computed meanwhile."""
         seen = self._measurement
         k = min(max(step + LATENCY, 0), len(self._reference.t) - 1)
         self._torques.append(self._controller.torque(k, seen.qpos, seen.qvel, seen.touching))

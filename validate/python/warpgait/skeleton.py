@@ -1,4 +1,4 @@
-"""What a robot's description says, in the terms of the planner: a base, and legs of three hinges that end in feet.
+"""What a robot's description says, in the terms of the planner: a base, and legs of two or three hinges that end in feet.
 
 Joints that belong to no leg (arms, heads, grippers, mimicking joints) are frozen, and their links are part of the link that carries them.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError
-from .model import JOINTS, merged
+from .model import JOINT_COUNTS, PITCH_ONLY, SAGITTAL, merged
 from .shapes import boxes_around
 from .urdf import Limits
 
@@ -24,6 +24,7 @@ GROUND_BAND = (
     0.35  # a leaf link whose lowest point is within this fraction of the robot's height above the lowest one may reach the ground
 )
 MOST_FEET = 8
+_ALIGNED = 1e-6  # of the direction of a joint axis
 _INERTIA_ROUNDING = 0.01  # by how much a principal moment may exceed the sum of the other two, as a fraction
 
 
@@ -70,7 +71,7 @@ class Link:
 
 @dataclass
 class Leg:
-    """Three links from the base down, and the foot."""
+    """Two or three links from the base down, and the foot."""
 
     links: list[Link]
     foot: Array  # (3,) its center, from the base's origin at zero joint angles
@@ -99,6 +100,7 @@ class Reader:
         self.free = self._free_joint()
         self.base = int(model.jnt_bodyid[self.free])
         self.frozen: dict[int, float] = {}
+        self.forward = 0.0  # rad, of the file's direction ahead from its x axis, about z
         self.data = mujoco.MjData(model)
 
     def _free_joint(self) -> int:
@@ -177,10 +179,10 @@ class Reader:
         self.frozen[joint] = angle
 
     def pose(self) -> None:
-        """Put `data` into zero joint angles, the frozen joints at theirs."""
+        """Put `data` into zero joint angles, the frozen joints at theirs, with the direction ahead along x."""
         self.data.qpos[:] = 0
         address = int(self.model.jnt_qposadr[self.free])
-        self.data.qpos[address + 3] = 1
+        self.data.qpos[address + 3 : address + 7] = [np.cos(self.forward / 2), 0, 0, -np.sin(self.forward / 2)]
         for joint in range(self.model.njnt):
             if self.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_BALL):
                 self.data.qpos[int(self.model.jnt_qposadr[joint])] = 1
@@ -270,6 +272,9 @@ def foot_of(reader: Reader, leaf: int, named: set[str], radius: float | None) ->
     bodies = _foot_bodies(reader, leaf, named) or [leaf]
     body = bodies[-1]
     geoms = reader.collision_geoms(bodies)
+    if not geoms:  # the foot is a mere frame: a sphere of its link may be what touches the ground
+        sphere = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+        geoms = [g for g in reader.collision_geoms(reader.link_bodies(leaf)) if int(reader.model.geom_type[g]) == sphere]
     shapes = {g: reader.shape(g) for g in geoms}
     origin = reader.data.xpos[reader.base]
     anchor = reader.data.xanchor[reader.joints_above(leaf)[-1]] - origin
@@ -314,7 +319,7 @@ def _thickness(shape: Shape) -> float:
 
 
 def leg_of(reader: Reader, leaf: int, named: set[str], radius: float | None) -> Leg:
-    """The leg that ends in a leaf link; refuses one that has not three hinges."""
+    """The leg that ends in a leaf link; refuses one that has not two or three hinges."""
     m = reader.model
     joints = reader.joints_above(leaf)
     names = ", ".join(reader.joint_name(j) for j in joints)
@@ -328,13 +333,19 @@ def leg_of(reader: Reader, leaf: int, named: set[str], radius: float | None) -> 
                 f'{reader.path}: joint "{reader.joint_name(j)}" of the leg to "{reader.name(leaf)}" follows "{reader.mimics[reader.joint_name(j)]}" (mimic); '
                 "legs have independent joints only"
             )
-    if len(joints) != JOINTS:
-        hint = " Hold one with --freeze JOINT=ANGLE." if len(joints) > JOINTS else ""
+    if len(joints) not in JOINT_COUNTS:
+        extra = len(joints) - max(JOINT_COUNTS)
+        hint = f"; hold {extra} of them still: --freeze JOINT=ANGLE, once for each" if extra > 0 else ""
         raise InputError(
-            f'{reader.path}: the leg to "{reader.name(leaf)}" has {len(joints)} joints ({names}); legs of {JOINTS} joints are supported.{hint}'
+            f'{reader.path}: the leg to "{reader.name(leaf)}" has {len(joints)} joints ({names}); allowed: two or three{hint}'
         )
     center, size, body, replaced = foot_of(reader, leaf, named, radius)
     links = [reader.link(int(m.jnt_bodyid[j]), j) for j in joints]
+    if len(links) == SAGITTAL and any(abs(link.axis[1]) < 1 - _ALIGNED for link in links):
+        axes = " and ".join(str(np.round(link.axis, 3).tolist()) for link in links)
+        raise InputError(
+            f'{reader.path}: the leg to "{reader.name(leaf)}": {PITCH_ONLY}; the axes of {names} are {axes}; if the robot does not face along x, say where: --forward'
+        )
     gone = [shape for g in replaced for shape in reader.shapes(g)]
     last = links[-1]
     kept = [s for s in last.shapes if not any(np.array_equal(s.center, f.center) and s.kind == f.kind for f in gone)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -29,7 +30,7 @@ def turned(axis: Array, angle: float) -> Array:
 
 
 def place(leg: Leg, q: Array) -> tuple[Array, list[tuple[Array, Array]]]:
-    """The center of the foot, and the rotation and place of each link's joint, for joint angles q (3,); from the base's origin."""
+    """The center of the foot, and the rotation and place of each link's joint, for joint angles q (J,); from the base's origin."""
     R, at, before = np.eye(3), np.zeros(3), np.zeros(3)
     frames = []
     for link, angle in zip(leg.links, q, strict=True):
@@ -40,29 +41,49 @@ def place(leg: Leg, q: Array) -> tuple[Array, list[tuple[Array, Array]]]:
 
 
 def ranges(leg: Leg) -> Array:
-    """Least and greatest angles (3, 2) rad; refuses joints without."""
+    """Least and greatest angles (J, 2) rad."""
     rows = [link.limits.range for link in leg.links]
     return np.array([row if row is not None else (-np.pi, np.pi) for row in rows])
 
 
 def length(leg: Leg) -> float:
-    """Of a stretched leg, from its second joint to the center of its foot, m."""
-    return float(np.linalg.norm(leg.links[2].anchor - leg.links[1].anchor) + np.linalg.norm(leg.foot - leg.links[2].anchor))
+    """Of a stretched leg, from its last joint but one to the center of its foot, m."""
+    thigh, shank = leg.links[-2:]
+    return float(np.linalg.norm(shank.anchor - thigh.anchor) + np.linalg.norm(leg.foot - shank.anchor))
 
 
 def stands(legs: list[Leg], stance: list[Array]) -> bool:
-    """Whether all feet are well below the second joints of their legs."""
+    """Whether all feet are well below the last joints but one of their legs."""
     return all(
-        frames[1][1][2] - foot[2] >= LEAST_HEIGHT * length(leg)
+        frames[-2][1][2] - foot[2] >= LEAST_HEIGHT * length(leg)
         for leg, q in zip(legs, stance, strict=True)
         for foot, frames in [place(leg, q)]
     )
 
 
-def computed(legs: list[Leg]) -> list[Array]:
-    """Stances with each foot under its hip, all at one height: the joint angles nearest to the middle of their ranges that do it."""
-    height = min(leg.links[1].anchor[2] - STRETCH * length(leg) - leg.radius for leg in legs)
-    return [_under_hip(leg, np.array([leg.links[1].anchor[0], leg.foot[1], height + leg.radius])) for leg in legs]
+def computed(legs: list[Leg]) -> list[list[Array]]:
+    """Stances with each foot under its hip, all at one height, best first.
+
+    The first has the joint angles nearest to the middle of their ranges; of equally near ones, those with the knees toward the middle of the
+    body. The others have all knees behind their feet, and all before them, where the ranges allow it.
+    """
+    height = min(leg.links[-2].anchor[2] - STRETCH * length(leg) - leg.radius for leg in legs)
+    found = [_under_hip(leg, np.array([leg.links[-2].anchor[0], leg.foot[1], height + leg.radius])) for leg in legs]
+    stances = [[min(postures, key=lambda p: p.rank).q for postures in found]]
+    for side in (-1.0, 1.0):
+        bent = [[p for p in postures if side * p.knee > 0] for postures in found]
+        if all(bent):
+            stances.append([min(postures, key=lambda p: p.rank).q for postures in bent])
+    return stances
+
+
+@dataclass(frozen=True)
+class _Posture:
+    """Of a leg whose foot is under its hip."""
+
+    q: Array  # (J,) rad
+    rank: float  # the distance of the angles from the middle of their ranges, and a little more where the knee is away from the body's middle
+    knee: float  # m before the foot
 
 
 def inside(legs: list[Leg], rough: list[Array], boxes: tuple[Box, ...]) -> list[Array]:
@@ -92,41 +113,43 @@ def _solved(leg: Leg, start: Array, target: Array) -> Array | None:
 
 
 def _bounds(leg: Leg) -> tuple[Array, Array]:
-    """Least and greatest angles (3,) of a computed stance."""
+    """Least and greatest angles (J,) of a computed stance."""
     limits = ranges(leg)
     low, high = np.maximum(limits[:, 0] + AT_LIMIT, -np.pi), np.minimum(limits[:, 1] - AT_LIMIT, np.pi)
     return low, high
 
 
-def _under_hip(leg: Leg, target: Array) -> Array:
+def _under_hip(leg: Leg, target: Array) -> list[_Posture]:
+    """All postures that are found."""
     low, high = _bounds(leg)
     middle, half = (low + high) / 2, (high - low) / 2
-    found: list[tuple[float, Array]] = []
-    starts = [np.linspace(lo, hi, _STARTS + 2)[1:-1] for lo, hi in zip(low[1:], high[1:], strict=True)]
-    for second, third in product(*starts):
-        start = np.array([np.clip(0.0, low[0], high[0]), second, third])
+    found = []
+    starts = [np.linspace(lo, hi, _STARTS + 2)[1:-1] for lo, hi in zip(low[-2:], high[-2:], strict=True)]
+    for last in product(*starts):
+        start = np.array([*np.clip(0.0, low[:-2], high[:-2]), *last])
         q = _solved(leg, start, target)
         if q is not None:
             _, frames = place(leg, q)
-            # Of equally central angles, those with the knee toward the middle of the body.
-            inward = np.sign(target[0]) * (frames[2][1][0] - target[0])
-            found.append((float((((q - middle) / half) ** 2).sum()) + 1e-3 * float(inward), q))
+            knee = float(frames[-1][1][0] - target[0])
+            rank = float((((q - middle) / half) ** 2).sum()) + 1e-3 * float(np.sign(target[0])) * knee
+            found.append(_Posture(q, rank, knee))
     if not found:
         raise InputError(
             f'leg "{leg.foot_body}": no joint angles within the limits put the foot under its hip, at {np.round(target, 3).tolist()} m from the base\'s '
             "origin; give the joint angles of a stance: --stance"
         )
-    return min(found, key=lambda pair: pair[0])[1]
+    return found
 
 
 def given(skeleton: Skeleton, values: list[float]) -> list[Array]:
-    """Stances from the user's numbers: three for all legs, or three for each."""
-    count = 3 * len(skeleton.legs)
-    if len(values) not in (3, count):
+    """Stances from the user's numbers: those of one leg for all of them, or those of each."""
+    each = len(skeleton.legs[0].links)
+    count = each * len(skeleton.legs)
+    if len(values) not in (each, count):
         raise InputError(
-            f"--stance: {len(values)} angles; allowed: 3, for every leg, or {count}, leg by leg ({_order(skeleton.legs)}), rad"
+            f"--stance: {len(values)} angles; allowed: {each}, for every leg, or {count}, leg by leg ({_order(skeleton.legs)}), rad"
         )
-    rows = np.resize(np.array(values, float), (len(skeleton.legs), 3))
+    rows = np.resize(np.array(values, float), (len(skeleton.legs), each))
     return list(rows)
 
 

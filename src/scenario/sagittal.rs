@@ -1,0 +1,62 @@
+//! Refuses ways that a robot cannot go whose feet move in planes of its base, as those of legs of two joints do.
+//!
+//! While such feet stand where they are, the base can move ahead, up and down, and pitch, but neither turn nor move sideways. So the way is a
+//! straight line, ahead or back, with one heading.
+
+use super::format::Scenario;
+use super::wrapped;
+use crate::Result;
+use crate::input::Document;
+use crate::robot::Robot;
+
+/// How far a place may be beside the line, m, and a heading off, rad.
+const BESIDE: f64 = 1e-3;
+const TURNED: f64 = 1e-3;
+
+/// Refuses a goal, a way-point or a heading off the straight line.
+pub(super) fn check(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    if !robot.is_sagittal() {
+        return Ok(());
+    }
+    let goal = &scenario.goal;
+    let refuse = |key: &str, what: String| {
+        let why = format!(
+            "{what}; legs of two joints take robot {} straight ahead or back, without turns",
+            robot.name
+        );
+        Err(document.error(key, why))
+    };
+    if goal.circle.is_some() {
+        return refuse("goal.circle", "given".into());
+    }
+    if let Some(turns) = goal.turns.filter(|turns| *turns != 0) {
+        return refuse("goal.turns", format!("given {turns}"));
+    }
+    let heading = scenario.start_yaw();
+    let ([x, y], (sin, cos)) = (scenario.start.position, heading.sin_cos());
+    let beside = |[u, v]: [f64; 2]| cos * (v - y) - sin * (u - x);
+    let off = |yaw: f64| wrapped(yaw - heading).abs() > TURNED;
+    let waypoints = goal.waypoints.iter().enumerate().map(|(n, waypoint)| {
+        let passed = if waypoint.time.is_some() { BESIDE } else { goal.waypoint_distance };
+        (format!("goal.waypoints[{n}]"), waypoint.position, waypoint.yaw, passed)
+    });
+    for (key, place, yaw, most) in waypoints.chain([("goal".into(), goal.position, goal.yaw, BESIDE)]) {
+        let aside = beside(place);
+        if aside.abs() > most {
+            let what = format!(
+                "given [{}, {}], {:.3} m beside the line through start.position with the heading at the start, {heading:.4} rad",
+                place[0],
+                place[1],
+                aside.abs()
+            );
+            return refuse(&format!("{key}.position"), what);
+        }
+        if let Some(yaw) = yaw.filter(|yaw| off(*yaw)) {
+            return refuse(
+                &format!("{key}.yaw"),
+                format!("given {yaw}, the heading at the start is {heading:.4} rad"),
+            );
+        }
+    }
+    Ok(())
+}
