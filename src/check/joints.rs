@@ -24,7 +24,8 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     for (n, e) in s.sample_feet() {
         let at = n * s.feet + e;
         let (angles, torques) = (body.angles[at], motor_torques(s, body, n, e));
-        for (j, joint) in s.robot.legs[e].joints.iter().enumerate() {
+        let joints = &s.robot.legs[e].joints;
+        for (joint, j) in joints.iter().zip(JOINTS - joints.len()..) {
             let [least, most] = joint.range;
             let beyond = (least - angles[j]).max(angles[j] - most).max(0.0);
             range.meet(if angles[j].is_nan() { f64::NAN } else { 1e3 * beyond }, n, Some(e));

@@ -1,9 +1,44 @@
-"""Solo 8, whose legs have two joints, over ground: planned, and replayed."""
+"""Solo 8, whose legs have two joints: planned, checked, replayed and exported."""
 
-from pathlib import Path
+from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from warpgait import Scenario, Terrain
-from warpgait.validation import validate
+from warpgait import InputError, Plan, Scenario, Terrain
+from warpgait.settings import Settings
+
+WAY = Scenario(
+    horizon=5.0,
+    robot="solo8",
+    terrain=Terrain.formula("0.01*sin(8*x)*cos(5*y)", extent=(-1.0, 1.0, -1.0, 1.0), spacing=0.02),
+    start=(0.0, 0.0),
+    goal=(0.25, 0.0),
+)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return WAY.solve()
+
+
+def test_the_feet_keep_to_their_planes(plan: Plan) -> None:
+    assert plan.solved and plan.passed
+    samples = plan.samples
+    # Heading and roll stay as they are, and so does the base's place to the side.
+    assert np.ptp(samples.base_position[:, 1]) < 3e-3
+    beside = samples.foot_position[..., 1] - samples.base_position[:, None, 1]
+    assert np.ptp(beside, axis=0).max() < 5e-3
+    assert np.ptp(samples.foot_position[..., 0], axis=0).min() > 0.2
+
+
+def test_it_is_replayed_with_eight_motors(plan: Plan) -> None:
+    report = plan.validate(Settings(quick=True))
+    assert report.verdict in ("pass", "marginal"), report
+    motion = plan.motion(50.0)
+    assert motion.joint_position.shape[1] == 8 and np.abs(motion.joint_torque).max() > 0.05
+
+
+def test_a_goal_to_the_side_is_refused() -> None:
+    with pytest.raises(InputError, match="straight ahead or back"):
+        WAY.set({"start": {"position": [0.0, 0.0], "yaw": 0.5}}).solve()
