@@ -196,7 +196,7 @@ impl Model {
         self.patches.get(foot).map(|stances| &stances[stance])
     }
 
-    /// When a stance is halfway over, in samples ([`Stance::middle`]); in a cyclic motion, where one that begins or ends with the motion is part
+    /// When a stance is halfway over, in samples ([`crate::trajectory::Stance::middle`]); in a cyclic motion, where one that begins or ends with the motion is part
     /// of a longer one, the middle of that, which may be before the start or after the end.
     pub fn halfway(&self, foot: usize, stance: usize) -> f64 {
         let (last, stances) = (self.layout.intervals as f64, &self.layout.feet[foot].stances);

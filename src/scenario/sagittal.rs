@@ -1,7 +1,7 @@
 //! Refuses ways that a robot cannot go whose feet move in planes of its base, as those of legs of two joints do.
 //!
-//! While such feet stand where they are, the base can move ahead, up and down, and pitch, but neither turn nor move sideways. So the way is a
-//! straight line, ahead or back, with one heading.
+//! While such feet stand where they are, the base can move ahead, up and down, pitch and, with legs of different lengths, roll, but neither turn
+//! nor leave its line by more than it rolls. So the way is a straight line, ahead or back, with one heading.
 
 use super::format::Scenario;
 use super::wrapped;

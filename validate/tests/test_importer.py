@@ -220,6 +220,23 @@ def test_a_robot_with_legs_of_two_joints(forward: str, tmp_path: Path) -> None:
         assert not found.inverse(data.site_xpos[index.site[e]] - data.xpos[index.base] + [0, 0.05, 0])[1]
 
 
+def ankles(text: str) -> str:
+    """The dog with a fourth joint in each leg."""
+    limit = '<axis xyz="0 1 0"/><limit lower="-0.5" upper="0.5" effort="9" velocity="9"/>'
+    return re.sub(r'(<joint name=".._end" type=)"fixed"(.*?)</joint>', rf'\1"revolute"\2{limit}</joint>', text)
+
+
+def test_joints_beyond_three_are_held_still_by_an_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "dog.urdf"
+    path.write_text(ankles(URDF))
+    assert importer.main([str(path), "-o", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err
+    assert "fl_end" in message and "hold 1 of them still: --freeze" in message and message.count("\n") == 1, message
+    found = importer.read(path, importer.arguments([str(path), "--freeze", "*_end=0.1"]))
+    assert [[link.joint for link in leg.links][-1] for leg in found.legs] == ["fl_knee", "fr_knee", "rl_knee", "rr_knee"]
+    assert all(leg.links[-1].mass == pytest.approx(0.25) for leg in found.legs)  # calf and foot
+
+
 def short() -> str:
     """A robot so short that front and hind thighs hit each other where the knees bend toward each other."""
     text = pup().replace('range="-2.6 -0.6"', 'range="-2.6 2.6"').replace('size="0.01" fromto', 'size="0.03" fromto')
@@ -321,6 +338,7 @@ def test_what_is_no_robot_is_refused_in_one_line(what: str, tmp_path: Path, caps
         (["--feet", "nose"], 'no link "nose"'),
         (["--freeze", "tail"], 'no joint "tail"'),
         (["--freeze", "neck=left"], "--freeze"),
+        (["--freeze", "neck=2"], "-1 to 1 rad"),
         (["--stance", "0,1"], "--stance"),
         (["--stance", "0,1,0"], '"fl_knee"'),
         (["-o", "../.x"], "not the name"),

@@ -10,6 +10,7 @@ import argparse
 import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -146,16 +147,24 @@ def _posture(reader: Reader, key: dict[str, float], central: float) -> Array:
     return q
 
 
-def _frozen(words: list[str]) -> dict[str, float]:
-    """The joints of --freeze JOINT=ANGLE."""
-    found = {}
+def _freeze(reader: Reader, words: list[str], posture: Array) -> None:
+    """Hold the joints of --freeze JOINT=ANGLE still; without an angle, as in `posture` (nq,). JOINT may be a pattern."""
+    names = [reader.joint_name(j) for j in range(reader.model.njnt)]
     for word in words:
-        name, _, angle = word.partition("=")
-        try:
-            found[name] = float(angle or 0)
-        except ValueError as error:
-            raise InputError(f"--freeze {visible(word)}: allowed: JOINT or JOINT=ANGLE, rad") from error
-    return found
+        pattern, equals, angle = word.partition("=")
+        joints = [j for j, name in enumerate(names) if fnmatchcase(name, pattern) and j != reader.free]
+        if not joints:
+            known = ", ".join(name for j, name in enumerate(names) if j != reader.free)
+            raise InputError(f'--freeze: {reader.path} has no joint "{visible(pattern)}"; its joints are {known}')
+        for j in joints:
+            try:
+                held = float(angle) if equals else float(posture[int(reader.model.jnt_qposadr[j])])
+            except ValueError as error:
+                raise InputError(f"--freeze {visible(word)}: allowed: JOINT or JOINT=ANGLE, rad") from error
+            low, high = reader.limits.get(names[j], Limits()).range or (-np.inf, np.inf)
+            if not low - 1e-6 <= held <= high + 1e-6:
+                raise InputError(f"--freeze {visible(word)}: allowed for {names[j]}: its range, {low:.4g} to {high:.4g} rad")
+            reader.freeze(j, held)
 
 
 def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
@@ -163,10 +172,7 @@ def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
     # A keyframe may be no stance, so the feet are looked for without it, too.
     postures = [_posture(reader, angles, central) for angles in (key, {}) for central in (0.0, 0.5, 1.0)]
     names = [reader.joint_name(j) for j in range(m.njnt)]
-    for name, angle in _frozen(options.freeze).items():
-        if name not in names:
-            raise InputError(f'--freeze: {reader.path} has no joint "{visible(name)}"; its joints are {", ".join(names)}')
-        reader.freeze(names.index(name), angle)
+    _freeze(reader, options.freeze, postures[0])
     wanted = [name for word in options.feet for name in word.split(",") if name]
     leaves = find_feet(reader, wanted, postures)
     of_legs = {j for leaf in leaves for j in reader.joints_above(leaf)}
@@ -307,7 +313,13 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--forward", choices=FORWARD, default="x", help="the direction in the file's base frame that is ahead (default: x)"
     )
-    parser.add_argument("--freeze", action="append", default=[], metavar="JOINT=Q", help="hold a joint still at an angle, rad")
+    parser.add_argument(
+        "--freeze",
+        action="append",
+        default=[],
+        metavar="JOINT=Q",
+        help="hold a joint still at an angle, rad (default: that of the keyframe, or as near to zero as it goes); with * for a part of the name, several",
+    )
     parser.add_argument("--without-meshes", action="store_true", help="leave out collision shapes whose meshes are not there")
     parser.add_argument("--source", help="where the file is from and its license, for the two files")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
