@@ -7,7 +7,7 @@
 //! g is what the joint bears for the links below it, their weight and inertia: a known function of time, zero for massless legs
 //! ([`crate::nlp::leg_terms`]). Legs that the robot's file does not describe have no rows.
 //!
-//! Rows: HAA, HFE, KFE for each free force; fraction of the limit.
+//! Rows: HAA, HFE, KFE for each free force; fraction of the limit. That of the abduction that a leg of two joints lacks is zero.
 
 use nalgebra::{Matrix3, Vector3};
 

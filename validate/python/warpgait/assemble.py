@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from . import stance as stances
 from .arrays import Array
 from .collision import PERIOD, SelfCollision
+from .errors import InputError
 from .kinematics import legs as legs_in
 from .mjcf import foot_names, order, write_mjcf
 from .model import indices
@@ -24,6 +26,7 @@ CYCLE, CYCLE_LENGTH = (
 )  # s, m: the cycle of ANYmal C and the length of its legs; cycles grow with the root of the length
 STANCE_ROUNDS = 4  # of stance and reach boxes
 TRIM = 0.25  # of the foot's radius: a shape of the shank that is not at least this much higher than the foot's lowest point is left out
+SAME = 1e-2  # rad: stances that differ less are the same
 SAMPLES = 300  # postures in which parts of the robot may hit each other
 MIDDLE = 0.5  # of half a reach box: how far a foot is from its middle in them
 
@@ -119,18 +122,24 @@ def assemble(skeleton: Skeleton, name: str, q: list[Array], source: str, words: 
 
 
 def assemble_freest(skeleton: Skeleton, name: str, alternatives: list[list[Array]], words: str) -> Imported:
-    """The robot in the first of several stances in which its parts do not hit each other, or else in that in which they do so least."""
-    found: list[tuple[int, Imported]] = []
-    for q in alternatives:
-        robot = assemble(skeleton, name, q, "computed", words)
-        found.append((self_collisions(robot), robot))
+    """The robot in the first of several stances in which its parts do not hit each other, or else in that in which they do so least.
+
+    Only the first must be possible.
+    """
+    first = assemble(skeleton, name, alternatives[0], "computed", words)
+    found = [(self_collisions(first), first)]
+    for q in alternatives[1:]:
         if found[-1][0] == 0:
             break
+        if not np.allclose(q, alternatives[0], atol=SAME):
+            with suppress(InputError):
+                robot = assemble(skeleton, name, q, "computed", words)
+                found.append((self_collisions(robot), robot))
     hits, best = min(found, key=lambda pair: pair[0])
     if best is not found[0][1]:
         best.skeleton.notes.append(
-            f"knees that bend toward each other would let parts of the robot hit each other in {found[0][0]} of {SAMPLES} postures; "
-            "all knees bend the same way"
+            f"all knees bend the same way; with the joints nearer to the middle of their ranges, parts of the robot hit each other in {found[0][0]} of "
+            f"{SAMPLES} postures"
         )
     if hits > 0:
         best.skeleton.notes.append(
