@@ -129,7 +129,8 @@ impl Prepared {
     /// What the planner is given.
     pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
         let (scenario, robot) = (&loaded.scenario, &loaded.robot);
-        Task { scenario, robot, steps: &self.steps, surfaces: &self.surfaces, map }
+        let guess = loaded.guess.as_deref();
+        Task { scenario, robot, steps: &self.steps, surfaces: &self.surfaces, guess, map }
     }
 }
 

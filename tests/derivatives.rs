@@ -45,7 +45,8 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));
     let steps = Steps::of(&scenario, &robot, &surfaces).expect("steps");
     let map = (scenario.formulation() != Formulation::Direct).then_some(&map);
-    let task = Task { scenario: &scenario, robot: &robot, steps: &steps, surfaces: &surfaces, map };
+    let task =
+        Task { scenario: &scenario, robot: &robot, steps: &steps, surfaces: &surfaces, guess: None, map };
     task.problem().expect("a problem")
 }
 

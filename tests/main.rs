@@ -16,6 +16,7 @@ mod edges;
 mod ends;
 mod exact;
 mod gaits;
+mod guess;
 mod measured_ground;
 mod motions;
 mod outputs;

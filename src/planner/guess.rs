@@ -1,12 +1,13 @@
 //! The initial guess: a straight line in the space of the variables, nominal footholds under the base, and the weight divided among
-//! the feet that stand.
+//! the feet that stand. Where the scenario gives a motion, that (`follow.rs`).
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::base_path::BasePath;
+use super::follow::follow;
 use crate::Result;
 use crate::nlp::Model;
-use crate::scenario::Scenario;
+use crate::scenario::{GivenMotion, Scenario};
 use crate::terrain::Patch;
 use crate::trajectory::rotation::euler;
 use crate::trajectory::space::Space;
@@ -22,13 +23,16 @@ const WAY_SAMPLES: usize = 20;
 ///
 /// # Errors
 /// When a foot cannot reach the ground at the start, or a pose has no preimage under the map.
-pub fn guess(scenario: &Scenario, model: &Model) -> Result<Vec<f64>> {
+pub fn guess(scenario: &Scenario, model: &Model, given: Option<&GivenMotion>) -> Result<Vec<f64>> {
     let path = BasePath::new(scenario, model)?;
     let mut x = vec![0.0; model.layout.variables];
     set_base(&path, model, &mut x);
     let footholds = set_footholds(&path, model, &mut x)?;
     set_swings(SWING_APEX * scenario.motion.swing_clearance, &footholds, model, &mut x)?;
     set_forces(&footholds, model, &mut x);
+    if let Some(motion) = given {
+        follow(motion, model, &mut x)?;
+    }
     set_given(model, &mut x);
     Ok(x)
 }
@@ -102,7 +106,7 @@ fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Ve
 }
 
 /// Where a stance must be, x and y.
-fn fixed(model: &Model, foot: usize, stance: usize) -> Option<[f64; 2]> {
+pub(super) fn fixed(model: &Model, foot: usize, stance: usize) -> Option<[f64; 2]> {
     let fixed = model.fixed.iter().find(|fixed| (fixed.foot, fixed.stance) == (foot, stance));
     fixed.map(|fixed| fixed.position)
 }
@@ -156,7 +160,7 @@ fn over_edge(apex: f64, patches: [&Patch; 2], c: usize, model: &Model) -> Result
 }
 
 /// A point of ambient space in a space of variables.
-fn pulled_back(space: &Space, point: &Vector3<f64>) -> Result<Vector3<f64>> {
+pub(super) fn pulled_back(space: &Space, point: &Vector3<f64>) -> Result<Vector3<f64>> {
     Ok(match space {
         Space::Direct => *point,
         Space::Warped(map) => Vector3::from(map.inverse((*point).into())?),
@@ -198,6 +202,14 @@ fn bearing_feet(model: &Model) -> Vec<f64> {
     (0..=layout.intervals).map(|k| total(k).max(1.0)).collect()
 }
 
+/// The ground at (x, y), in the space of the variables.
+pub(super) fn on_ground(model: &Model, [x, y]: [f64; 2]) -> Result<Vector3<f64>> {
+    Ok(match &model.spaces.feet {
+        Space::Direct => Vector3::new(x, y, model.surfaces.feet.height(x, y)),
+        Space::Warped(map) => map.ground_inverse([x, y]).map(|[x, y]| Vector3::new(x, y, 0.0))?,
+    })
+}
+
 /// Where foot `i` would stand under a base with variables y, in the space of the variables.
 fn foothold_under(model: &Model, i: usize, y: &[f64; 6]) -> Vector3<f64> {
     let (point, turn) = model.spaces.base.pose(y, false);
@@ -205,13 +217,10 @@ fn foothold_under(model: &Model, i: usize, y: &[f64; 6]) -> Vector3<f64> {
     if let Some(keep_out) = &model.surfaces.keep_out {
         [q.x, q.y] = keep_out.moved_out([q.x, q.y]);
     }
-    match &model.spaces.feet {
-        Space::Direct => Vector3::new(q.x, q.y, model.surfaces.feet.height(q.x, q.y)),
-        Space::Warped(map) => {
-            let [x, y] = map.ground_inverse([q.x, q.y]).unwrap_or_else(|_| without_preimage(model, i, y, &q));
-            Vector3::new(x, y, 0.0)
-        }
-    }
+    on_ground(model, [q.x, q.y]).unwrap_or_else(|_| {
+        let [x, y] = without_preimage(model, i, y, &q);
+        Vector3::new(x, y, 0.0)
+    })
 }
 
 /// A place in F for a foothold q that has no preimage, such as one outside the map's box: with the base in F, the nominal offset

@@ -14,7 +14,7 @@
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | `travel` | whether the goal is within range at all |
 //! | `legs` | what the legs' own mass adds to the laws, from a motion |
-//! | [`mod@guess`] | where a solve starts |
+//! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | `friction_margin` | the same, and what a smaller margin of friction would do |
 //! | `elastic`, `why` | when no motion is found: which limits would have to give |
@@ -32,6 +32,7 @@ mod bounds;
 mod cyclic;
 pub mod derivatives;
 mod elastic;
+mod follow;
 mod foothold_search;
 mod footholds;
 mod friction_margin;

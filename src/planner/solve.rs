@@ -21,7 +21,7 @@ use crate::heightfield::Heightfield;
 use crate::ipopt::{self, INTERRUPT, IterationRecord, LinearSolver, Multipliers, Status};
 use crate::nlp::{LegTerms, Model};
 use crate::robot::Robot;
-use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, Hessian, Scenario};
+use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, GivenMotion, Hessian, Scenario};
 use crate::terrain::Surfaces;
 use crate::trajectory::Spaces;
 use crate::warp::WarpMap;
@@ -53,6 +53,8 @@ pub struct Task<'a> {
     pub steps: &'a Steps,
     /// Its ground.
     pub surfaces: &'a Surfaces,
+    /// A motion to start from, where the scenario gives one.
+    pub guess: Option<&'a GivenMotion>,
     /// The map over the posture surface, for all formulations but the direct one.
     pub map: Option<&'a WarpMap>,
 }
@@ -80,7 +82,7 @@ impl Task<'_> {
     /// Those of the guess.
     pub fn problem(&self) -> Result<GaitProblem> {
         let mut model = self.model()?;
-        let x = guess::guess(self.scenario, &model)?;
+        let x = guess::guess(self.scenario, &model, self.guess)?;
         model.leg_terms = legs::terms(&model, &x, self.scenario.physics.law).unwrap_or_default();
         Ok(GaitProblem::new(self.scenario, model, x, Choice { with_costs: true, exact_hessian: true }))
     }
@@ -216,7 +218,9 @@ impl<'a> Solve<'a> {
 
     fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
         let start = Instant::now();
-        let x = guess::guess(self.task.scenario, model)?;
+        // A motion that is given is one over the whole ground.
+        let is_whole = Arc::ptr_eq(&model.surfaces.posture, &self.task.surfaces.posture);
+        let x = guess::guess(self.task.scenario, model, self.task.guess.filter(|_| is_whole))?;
         self.seconds.guess += start.elapsed().as_secs_f64();
         Ok(x)
     }

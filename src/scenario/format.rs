@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::conditions::{FootholdSpec, ForceSpec, PayloadSpec, PostureSpec};
 use super::gait::GaitSpec;
 use super::goal::GoalSpec;
+use super::guess::GuessSpec;
 use super::keep_out::KeepOutSpec;
 use super::map::MapSpec;
 use super::motion::{ContactSpec, DiscretizationSpec, Footholds, Legs, MotionSpec, PhysicsSpec};
@@ -66,6 +67,9 @@ pub struct Scenario {
     /// Footholds whose place is given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub foothold: Vec<FootholdSpec>,
+    /// A motion to start the solve from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guess: Option<GuessSpec>,
     /// Friction and footholds.
     #[serde(default)]
     pub contact: ContactSpec,

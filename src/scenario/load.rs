@@ -1,15 +1,21 @@
 //! Loads a scenario: its file, the overrides from the command line, and its robot, checked together.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::consistency;
 use super::continued;
 use super::format::Scenario;
+use super::guess::{GivenMotion, GuessSpec};
 use super::way;
 use crate::digest::sha256_hex;
+use crate::files;
 use crate::input::{self, Document};
 use crate::robot::Robot;
 use crate::{Error, Result};
+
+/// Name and SHA-256 (hexadecimal) of a file.
+type Input = (String, String);
 
 /// A scenario and its robot, with where they came from.
 #[derive(Clone, Debug)]
@@ -29,6 +35,8 @@ pub struct LoadedScenario {
     pub base_dir: PathBuf,
     /// Name and SHA-256 (hexadecimal) of each file read so far: the scenario's and the robot's, where these are files.
     pub inputs: Vec<(String, String)>,
+    /// The motion to start the solve from, where it names one.
+    pub guess: Option<Arc<GivenMotion>>,
     document: Document,
     /// The plan that it goes on from.
     start_plan: Option<PathBuf>,
@@ -39,8 +47,9 @@ pub struct LoadedScenario {
 impl LoadedScenario {
     /// The files that it is read from: the scenario, the robot and the terrain, as far as these are files.
     pub fn files(&self) -> Vec<PathBuf> {
-        let Scenario { robot, terrain, .. } = &self.scenario;
-        let named = [robot.file.as_deref(), terrain.file()].into_iter().flatten();
+        let Scenario { robot, terrain, guess, .. } = &self.scenario;
+        let guess = guess.as_ref().map(|guess| &*guess.file);
+        let named = [robot.file.as_deref(), terrain.file(), guess].into_iter().flatten();
         let own = self.file.iter().chain(&self.start_plan).cloned();
         named.map(|name| self.base_dir.join(name)).chain(own).collect()
     }
@@ -136,13 +145,21 @@ fn assemble(
     let changed = by_size || by_speed || by_gait || start_plan.is_some();
     let scenario = if changed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
+    let guess = given(&document, &scenario, &robot, &base_dir)?;
     let effective_text = match overrides {
         [] if !changed => source_text.clone(),
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
         start_plan: start_plan.as_ref().map(|(name, _)| base_dir.join(name)),
-        inputs: robot.input.iter().cloned().chain(start_plan).collect(),
+        inputs: robot
+            .input
+            .iter()
+            .cloned()
+            .chain(start_plan)
+            .chain(guess.as_ref().map(|(_, input)| input.clone()))
+            .collect(),
+        guess: guess.map(|(motion, _)| motion),
         scenario,
         robot,
         effective_text,
@@ -152,6 +169,22 @@ fn assemble(
         document,
         file: None,
     })
+}
+
+/// The motion that the scenario gives to start from, and its file's name and SHA-256.
+fn given(
+    document: &Document,
+    scenario: &Scenario,
+    robot: &Robot,
+    base_dir: &Path,
+) -> Result<Option<(Arc<GivenMotion>, Input)>> {
+    let Some(GuessSpec { file }) = &scenario.guess else { return Ok(None) };
+    let path = base_dir.join(file);
+    let feet: Vec<&str> = robot.feet.iter().map(|foot| &*foot.name).collect();
+    let located = |e: Error| document.error("guess.file", e);
+    let motion = GivenMotion::read(&path, &feet, scenario.horizon).map_err(located)?;
+    let digest = sha256_hex(files::read(&path, files::MAX_FILE).map_err(located)?);
+    Ok(Some((Arc::new(motion), (file.clone(), digest))))
 }
 
 /// Sets the lengths that the scenario leaves to the robot: the defaults, which are for ANYmal, times the robot's size. Whether there are any.

@@ -21,7 +21,7 @@ use mutate::Random;
 use warpgait::check::{CheckLimits, check};
 use warpgait::heightfield::Heightfield;
 use warpgait::plan::Plan;
-use warpgait::scenario::{self, MapSpec};
+use warpgait::scenario::{self, GivenMotion, MapSpec};
 use warpgait::{digest, terrain, warp};
 
 /// Runs `read` on every input that `make` makes in a folder of its own.
@@ -82,6 +82,19 @@ fn robot() {
         |folder, input| {
             file(folder, "r.toml", input);
             let _ = scenario::load_text("s.toml", seeds::FLAT, folder, &["robot.file=\"r.toml\"".into()]);
+        },
+    );
+}
+
+#[test]
+fn guess() {
+    let seeds = seeds::motions();
+    fuzz(
+        "guess",
+        |random| mutate::bytes(random, &seeds),
+        |folder, input| {
+            file(folder, "m.csv", input);
+            let _ = GivenMotion::read(&folder.join("m.csv"), &["L", "R"], 1.0);
         },
     );
 }

@@ -37,6 +37,14 @@ pub fn robots() -> Vec<Vec<u8>> {
     texts("robots")
 }
 
+/// Motions of a robot with the feet L and R.
+pub fn motions() -> Vec<Vec<u8>> {
+    let names = "time,base_position_x,base_position_y,base_position_z,base_quaternion_w,base_quaternion_x,base_quaternion_y,base_quaternion_z,\
+        L_foot_position_x,L_foot_position_y,L_foot_position_z,R_foot_position_x,R_foot_position_y,R_foot_position_z";
+    let rows = "0,0,0,0.5,1,0,0,0,0,0.1,0,0,-0.1,0\n1.0,0.2,0,0.5,1,0,0,0,0.2,0.1,0,0.2,-0.1,0\n";
+    vec![format!("# {{\"a\": 1}}\n{names}\n{rows}").into_bytes()]
+}
+
 pub fn overrides() -> Vec<Vec<u8>> {
     [
         "gait.kind=trot",

@@ -231,3 +231,20 @@ def test_the_package_is_imported_without_mujoco() -> None:
 
     code = "import sys, warpgait; print('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"
+
+
+def test_a_plan_or_what_it_is_exported_to_is_a_guess(plan: Plan, tmp_path: Path) -> None:
+    plan.to_csv(tmp_path / "walk.csv", rate=100.0)
+    for guess in (plan, tmp_path / "walk.csv"):
+        seen: list[warpgait.Iterate] = []
+        found = warpgait.solve(WALK, guess=guess, watch=seen.append)
+        first = seen[0]
+        np.testing.assert_allclose(first.base_position, plan.base(first.t).position, atol=2e-3)
+        np.testing.assert_allclose(first.foot_position, plan.feet(first.t).position, atol=1e-2)
+        assert found.solved and found.meta["solver"]["iterations"] < plan.meta["solver"]["iterations"]
+    text = (tmp_path / "walk.csv").read_text().replace("LF_contact_position_y", "LF")
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InputError, match=r"bad\.csv:\d+: LF_contact_position_y: there is no such column"):
+        warpgait.solve(WALK, guess=tmp_path / "bad.csv")
+    with pytest.raises(InputError, match=r"lasts 3.* s, the motion 2"):
+        Scenario.from_text(WALK).set({"horizon": 2.0, "guess.file": str(tmp_path / "walk.csv")}).solve()

@@ -311,14 +311,20 @@ def solve(
     overrides: dict[str, Any] | None = None,
     progress: Progress | None = None,
     watch: Watch | None = None,
+    guess: Plan | str | PathLike[str] | None = None,
 ) -> Plan:
     """Plan the motion of a scenario and check it, as `warpgait solve` does.
 
     `scenario` is a `Scenario`, a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
     `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
     iteration of the nonlinear program, and `watch(iterate)` at most ten times a second with an `Iterate`, the motion so far. An exception that
-    they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A solve that does not converge is not an error: see `solved` and `passed`.
+    they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A
+    solve that does not converge is not an error: see `solved` and `passed`. `guess` is a plan, or the file of a motion, to start from, as
+    `guess.file` names it.
     """
+    if guess is not None:
+        file = guess.path if isinstance(guess, Plan) else Path(guess)
+        overrides = {**(overrides or {}), "guess.file": str(file.resolve())}
     if isinstance(scenario, Scenario):
         return (scenario.set(overrides) if overrides else scenario).solve(progress, watch)
     return Plan(_native.solve(scenario, overrides=overrides, progress=progress, watch=watch))

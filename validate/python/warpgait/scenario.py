@@ -145,7 +145,7 @@ class Scenario:
                     raise InputError(f"{key}: {part} is a value, not a table")
             place[last] = deepcopy(value)
         if self._path is not None:
-            for table in ("terrain", "robot"):
+            for table in ("terrain", "robot", "guess"):
                 if isinstance(values.get(table), dict) and isinstance(values[table].get("file"), str):
                     values[table]["file"] = str(self._path.parent / values[table]["file"])
         return values
