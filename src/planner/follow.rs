@@ -3,7 +3,6 @@
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::base_path::middle;
 use super::guess::{fixed, on_ground, pulled_back};
 use super::standing::{self, Pose};
 use crate::nlp::Model;
@@ -74,7 +73,7 @@ fn set_footholds(motion: &GivenMotion, model: &Model, x: &mut [f64]) -> Result<(
             if fixed(model, i, j).is_some() {
                 continue;
             }
-            let t = middle(&stance.stance, layout.intervals as f64) * layout.time_step;
+            let t = stance.stance.middle(layout.intervals as f64) * layout.time_step;
             let [px, py, _] = motion.foot(i, t);
             let foothold = match model.patch(i, j) {
                 Some(patch) => {
