@@ -188,7 +188,8 @@ pub fn run(
         false => None,
     };
     let _ = observer(&Event::Step(Step::Solve));
-    let motion = planner::solve(&task, &mut Planning { spec: &scenario.map, observer: &mut *observer })?;
+    let motion = planner::solve(&task, &mut Planning { spec: &scenario.map, observer: &mut *observer })
+        .map_err(|e| loaded.locate(e))?;
 
     let _ = observer(&Event::Step(Step::Plan));
     let provenance = Provenance { loaded, ground: &prepared.ground, map_seconds };

@@ -115,7 +115,7 @@ pub trait Host {
 
 /// Plans a motion: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
 /// the terrain grows out of the plane in steps, each solved from the one before; over ground with edges, a second solve that leaves
-/// the joints to the end.
+/// the joints to the end. A motion that the scenario gives is solved from at once; if that fails, what follows forgets it.
 ///
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
@@ -130,15 +130,20 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         Continuation::Steps(n) => n,
     };
     let over_edges = task.surfaces.have_edges();
-    let fraction = if steps == 0 && !over_edges { 1.0 } else { PLAIN_FRACTION };
+    let is_given = task.guess.is_some();
+    let fraction = if steps == 0 && !over_edges && !is_given { 1.0 } else { PLAIN_FRACTION };
     let budget = (solver.max_iterations as f64 * fraction) as usize;
     let mut solve = Solve::new(task, host);
-    let first = if over_edges { solve.at_once(budget)? } else { solve.joints_last(budget)? };
+    let first = if over_edges || is_given { solve.at_once(budget)? } else { solve.joints_last(budget)? };
     let first = solve.with_leg_mass(first)?;
     if first.feasible || first.interrupted {
         return Ok(solve.finish(first, None));
     }
+    solve.given = None;
     let (how, second) = match (over_edges, steps) {
+        (false, 0) if is_given => {
+            ("also from another guess than guess.file", Some(solve.joints_last(solver.max_iterations)?))
+        }
         (true, _) => (
             "also in a second attempt, which leaves the joints to the end",
             Some(solve.joints_last(solver.max_iterations)?),
@@ -192,6 +197,8 @@ struct StageEnd {
 /// What all stages of a solve have in common.
 struct Solve<'a> {
     task: &'a Task<'a>,
+    /// The motion to start from; none any more once a solve from it has failed.
+    given: Option<&'a GivenMotion>,
     host: &'a mut dyn Host,
     start: Instant,
     history: Vec<IterationRecord>,
@@ -206,6 +213,7 @@ impl<'a> Solve<'a> {
     fn new(task: &'a Task, host: &'a mut dyn Host) -> Self {
         Self {
             task,
+            given: task.guess,
             host,
             start: Instant::now(),
             history: Vec::new(),
@@ -218,9 +226,7 @@ impl<'a> Solve<'a> {
 
     fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
         let start = Instant::now();
-        // A motion that is given is one over the whole ground.
-        let is_whole = Arc::ptr_eq(&model.surfaces.posture, &self.task.surfaces.posture);
-        let x = guess::guess(self.task.scenario, model, self.task.guess.filter(|_| is_whole))?;
+        let x = guess::guess(self.task.scenario, model, self.given)?;
         self.seconds.guess += start.elapsed().as_secs_f64();
         Ok(x)
     }
@@ -228,12 +234,13 @@ impl<'a> Solve<'a> {
     /// Solves from the guess, until there are `budget` iterations in all.
     ///
     /// Over ground with edges the guess is good, because the footholds and the timing of the base were chosen; a feasible point
-    /// without joints and costs would be a worse start (docs/results.md).
+    /// without joints and costs would be a worse start (docs/results.md). So it is with a motion that is given.
     fn at_once(&mut self, budget: usize) -> Result<StageEnd> {
         let mut model = self.task.model()?;
         let x = self.guess(&model)?;
         model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
-        self.stage(Stage::Whole, model, x, Start::Guess, self.task.scenario.solver.effort, budget)
+        let start = if self.given.is_some() { Start::Feasible } else { Start::Guess };
+        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, budget)
     }
 
     /// Solves from the guess, until there are `budget` iterations in all.

@@ -242,6 +242,7 @@ def test_a_plan_or_what_it_is_exported_to_is_a_guess(plan: Plan, tmp_path: Path)
         np.testing.assert_allclose(first.base_position, plan.base(first.t).position, atol=2e-3)
         np.testing.assert_allclose(first.foot_position, plan.feet(first.t).position, atol=1e-2)
         assert found.solved and found.meta["solver"]["iterations"] < plan.meta["solver"]["iterations"]
+        assert seen[0].stage == "solve" and seen[0].violation < 0.05
     text = (tmp_path / "walk.csv").read_text().replace("LF_contact_position_y", "LF")
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(InputError, match=r"bad\.csv:\d+: LF_contact_position_y: there is no such column"):

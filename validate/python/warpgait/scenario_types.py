@@ -376,6 +376,14 @@ class FootholdSpec(TypedDict, total=False):
     """x, y, m."""
 
 
+class GuessSpec(TypedDict, total=False):
+    """`[guess]`."""
+
+    file: str
+    """A motion of base and feet, relative to the scenario: a CSV with the columns of `warpgait export --to csv`, or a plan. Its gait
+    should be that of the scenario."""
+
+
 class ContactSpec(TypedDict, total=False):
     """`[contact]`."""
 
@@ -489,6 +497,8 @@ class ScenarioTables(TypedDict, total=False):
     """Where no foot may stand."""
     foothold: Sequence[FootholdSpec]
     """Footholds whose place is given."""
+    guess: GuessSpec
+    """A motion to start the solve from."""
     contact: ContactSpec
     """Friction and footholds."""
     physics: PhysicsSpec

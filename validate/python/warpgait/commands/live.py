@@ -17,7 +17,7 @@ from ..text import visible
 from .overrides import assigned
 
 _AFTER = 0.3  # s after the last page was sent, for other windows that show it
-_LAST_WORDS = 0.5  # s for a solve that is to stop
+_LAST_WORDS = 0.2  # s for a solve that is to stop
 
 
 class _StoppedError(Exception):
