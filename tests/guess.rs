@@ -163,7 +163,7 @@ fn files_that_do_not_fit_are_refused_with_their_line() {
     motion.write(&folder.path().join("other.plan.npz")).unwrap();
     let error = load_text("s.toml", &plan, folder.path(), &[]).unwrap_err().to_string();
     assert!(
-        error.contains("foot_names: feet LF, RF, LM, RH; the feet of the robot are LF, RF, LH, RH"),
+        error.contains("`foot_names`: feet LF, RF, LM, RH; the feet of the robot are LF, RF, LH, RH"),
         "{error}"
     );
     let error =

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::guess::{fixed, on_ground, pulled_back};
+use super::places::{fixed, on_ground, pulled_back};
 use super::standing::{self, Pose};
 use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::base_path::BasePath;
 use super::follow::follow;
+use super::places::{fixed, on_ground, pulled_back};
 use crate::Result;
 use crate::nlp::Model;
 use crate::scenario::{GivenMotion, Scenario};
@@ -105,12 +106,6 @@ fn set_footholds(path: &BasePath, model: &Model, x: &mut [f64]) -> Result<Vec<Ve
     Ok(footholds)
 }
 
-/// Where a stance must be, x and y.
-pub(super) fn fixed(model: &Model, foot: usize, stance: usize) -> Option<[f64; 2]> {
-    let fixed = model.fixed.iter().find(|fixed| (fixed.foot, fixed.stance) == (foot, stance));
-    fixed.map(|fixed| fixed.position)
-}
-
 /// Control points of the swings, evenly spaced from foothold to foothold, lifted to the apex.
 fn set_swings(apex: f64, footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut [f64]) -> Result<()> {
     for (i, (foot, footholds)) in model.layout.feet.iter().zip(footholds).enumerate() {
@@ -159,14 +154,6 @@ fn over_edge(apex: f64, patches: [&Patch; 2], c: usize, model: &Model) -> Result
     pulled_back(&model.spaces.feet, &point)
 }
 
-/// A point of ambient space in a space of variables.
-pub(super) fn pulled_back(space: &Space, point: &Vector3<f64>) -> Result<Vector3<f64>> {
-    Ok(match space {
-        Space::Direct => *point,
-        Space::Warped(map) => Vector3::from(map.inverse((*point).into())?),
-    })
-}
-
 /// Upright forces, equal for all feet that stand.
 fn set_forces(footholds: &[Vec<Vector3<f64>>], model: &Model, x: &mut [f64]) {
     let bearing = bearing_feet(model);
@@ -200,14 +187,6 @@ fn bearing_feet(model: &Model) -> Vec<f64> {
     };
     let total = |k: usize| (0..model.feet()).map(|i| activation(i, k)).sum::<f64>();
     (0..=layout.intervals).map(|k| total(k).max(1.0)).collect()
-}
-
-/// The ground at (x, y), in the space of the variables.
-pub(super) fn on_ground(model: &Model, [x, y]: [f64; 2]) -> Result<Vector3<f64>> {
-    Ok(match &model.spaces.feet {
-        Space::Direct => Vector3::new(x, y, model.surfaces.feet.height(x, y)),
-        Space::Warped(map) => map.ground_inverse([x, y]).map(|[x, y]| Vector3::new(x, y, 0.0))?,
-    })
 }
 
 /// Where foot `i` would stand under a base with variables y, in the space of the variables.

@@ -7,6 +7,7 @@
 //! | `cyclic` | whether the ground repeats itself under a cyclic motion |
 //! | `way` | the line of the base from start to goal, with headings |
 //! | `base_path` | where the base is guessed to be at each time |
+//! | `places` | points of the ground, and of ambient space, in the variables |
 //! | `pace` | when it is where on its way, if it travels steadily |
 //! | `footholds` | which patch each stance gets, where feet may stand on patches only |
 //! | `foothold_search` | the search for them |
@@ -42,6 +43,7 @@ pub mod legs;
 pub mod motion;
 mod options;
 mod pace;
+mod places;
 pub mod problem;
 mod retiming;
 pub mod solve;
