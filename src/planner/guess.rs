@@ -11,7 +11,6 @@ use crate::nlp::Model;
 use crate::scenario::{GivenMotion, Scenario};
 use crate::terrain::Patch;
 use crate::trajectory::rotation::euler;
-use crate::trajectory::space::Space;
 use crate::trajectory::switches;
 use crate::warp::Order;
 
