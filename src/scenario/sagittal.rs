@@ -60,3 +60,52 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: &Robot) -> 
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::scenario::load_text;
+
+    #[test]
+    fn ways_that_legs_of_two_joints_cannot_go_are_refused() {
+        let of = |robot: &str, ends: &str| {
+            let text = format!("[terrain]\nkind = \"flat\"\n[robot]\nname = \"{robot}\"\n{ends}");
+            load_text("s.toml", &text, Path::new("."), &[]).map_err(|e| e.to_string())
+        };
+        let way = |start: &str, goal: &str| {
+            format!("[start]\nposition = [0.0, 0.0]\n{start}\n[goal]\nposition = [0.3, 0.3]\n{goal}\n")
+        };
+        let stop = |rest: &str| format!("[[goal.waypoints]]\n{rest}");
+        for (start, goal, expected) in [
+            ("yaw = 0.0", "", "s.toml:9: goal.position: given [0.3, 0.3], 0.300 m beside the line"),
+            ("", "yaw = 0.0", "s.toml:10: goal.yaw: given 0, the heading at the start is 0.7854 rad"),
+            ("", "turns = 1", "s.toml:10: goal.turns: given 1"),
+            ("", "circle = { center = [0.0, 0.3] }", "s.toml:10: goal.circle: given"),
+            ("", &stop("position = [0.1, 0.3]"), "goal.position: given [0.3, 0.3], 0.190 m beside the line"),
+            (
+                "yaw = 0.7853981634",
+                &stop("position = [0.1, 0.3]"),
+                "goal.waypoints[0].position: given [0.1, 0.3]",
+            ),
+            (
+                "yaw = 0.7853981634",
+                &stop("position = [0.15, 0.15]\nyaw = 1.0"),
+                "goal.waypoints[0].yaw: given 1,",
+            ),
+        ] {
+            let message = of("solo8", &way(start, goal)).expect_err(expected);
+            assert!(message.contains(expected) && message.contains("straight ahead or back"), "{message}");
+            assert!(!message.contains('\n'), "{message}");
+            assert!(of("solo12", &way(start, goal)).is_ok(), "{goal}");
+        }
+        for (start, goal) in [
+            ("", ""),
+            ("yaw = -2.35619449", ""), // backward
+            ("", "yaw = 0.7853981634"),
+            ("yaw = 0.7853981634", "[[goal.waypoints]]\nposition = [0.12, 0.16]"),
+        ] {
+            of("solo8", &way(start, goal)).expect(goal);
+        }
+    }
+}
