@@ -54,6 +54,33 @@ fn contradictions_are_refused_with_both_lines() {
             "s.toml:14: force[0].until: given 1 s, allowed: after 2 s (force[0].from, line 13)",
         ),
         (
+            "[[keep_out]]\npolygon = [[-1.0, -1.0], [0.2, -1.0], [0.2, 1.0], [-1.0, 1.0]]\n".into(),
+            "s.toml:8: start.position: given [0, 0], where foot LH finds no place to stand: all that it reaches is kept free of feet (keep_out[0].polygon, line 12)",
+        ),
+        (
+            "[start.state]\nfeet = [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]]\n\
+             [[keep_out]]\npolygon = [[-0.4, 0.1], [-0.2, 0.1], [-0.2, 0.3]]\n".into(),
+            "s.toml:12: start.state.feet[2]: given [-0.3, 0.2], which is kept free of feet (keep_out[0].polygon, line 14)",
+        ),
+        ("[[keep_out]]\n".into(), "s.toml:11: keep_out[0]: gives neither a polygon nor a mask"),
+        (
+            "[[keep_out]]\nmask = \"absent.png\"\npolygon = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]\n".into(),
+            "s.toml:13: keep_out[0].polygon: given together with a mask (keep_out[0].mask, line 12); remove one",
+        ),
+        ("[[keep_out]]\nmask = \"absent.png\"\n".into(), "s.toml:12: keep_out[0].mask: "),
+        (
+            "[[gait.sequence]]\nkind = \"walk\"\nduration = 3.0\n".into(),
+            "s.toml:11: gait.sequence: the durations sum to 3 s, but the horizon is 5 s (horizon, line 1)",
+        ),
+        (
+            "[[gait.sequence]]\nkind = \"stand\"\nduty = 0.6\n".into(),
+            "s.toml:13: gait.sequence[0].duty: given for \"stand\" (gait.sequence[0].kind, line 12), which has no steps",
+        ),
+        (
+            "[gait]\nkind = \"custom\"\nphases = [[4.0], [5.0], [5.0], [5.0]]\n".into(),
+            "s.toml:13: gait.phases[0]: the durations sum to 4 s, expected the horizon, 5 s (horizon, line 1)",
+        ),
+        (
             "[[keep_out]]\npolygon = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]\n".into(),
             "s.toml:12: keep_out[0].polygon: its corners are on a line",
         ),
@@ -109,4 +136,62 @@ fn what_no_motion_can_do_is_explained_and_stays_unsolved() {
     assert!(solved(&less).0.solved, "{to}");
     let (motion, plan) = solved(&text(false));
     assert!(!motion.solved && plan.meta.explanation.is_none());
+}
+
+/// A NumPy array of bytes.
+fn npy(dtype: &str, rows: u64, columns: u64, elements: &[u8]) -> Vec<u8> {
+    let header = warpgait::files::npy::Header {
+        dtype: dtype.into(),
+        fortran_order: false,
+        shape: vec![rows, columns],
+    };
+    [header.write().expect("a header"), elements.to_vec()].concat()
+}
+
+#[test]
+fn a_mask_keeps_feet_off_and_the_plan_has_its_outlines() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Cells of 10 cm; a stripe of 20 cm on the left side of the way, and one cell far away.
+    let mut cells = vec![0_u8; 40 * 40];
+    for row in 16..18 {
+        cells[row * 40..][20..30].fill(1);
+    }
+    cells[0] = 1;
+    std::fs::write(folder.path().join("mask.npy"), npy("|b1", 40, 40, &cells)).expect("a file");
+    let text = "formulation = \"direct\"\nhorizon = 4.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
+                [start]\nposition = [-0.5, 0.0]\n[goal]\nposition = [0.3, 0.0]\n[[keep_out]]\nmask = \"mask.npy\"\n";
+    let (motion, mut plan) = crate::common::solved_in(folder.path(), text);
+    assert!(motion.solved, "{}", motion.status);
+    let row = |plan: &warpgait::plan::Plan| {
+        let report = check(plan).expect("a sound plan");
+        report.rows.iter().find(|row| row.name == "keep_out").map(|row| row.passed)
+    };
+    assert_eq!(row(&plan), Some(true));
+    assert!(plan.meta.inputs.iter().any(|(name, _)| name == "mask.npy"));
+    let scenario = warpgait::scenario::parse("s.toml", &plan.meta.scenario).expect("a scenario");
+    let kept = &scenario.keep_out[0];
+    assert!(kept.mask.is_none() && kept.outlines.len() == 2);
+    // Row 16 is from 0.3 to 0.4 m.
+    for (place, distance) in
+        [([0.5, 0.3], -0.1), ([0.5, 0.5], 0.1), ([0.5, 0.0], 0.2), ([-1.95, 1.95], -0.05)]
+    {
+        assert!((kept.distance(place) - distance).abs() < 1e-9, "{place:?}: {}", kept.distance(place));
+    }
+    // In the middle of the stripe a foot is too deep.
+    let stands = plan.foot_contact.iter().position(|stands| *stands).expect("a stance");
+    plan.foot_position[stands] = [0.5, 0.3, 0.0];
+    assert_eq!(row(&plan), Some(false));
+
+    for (content, words) in [
+        (b"GIF89a".to_vec(), "is neither a PNG image nor a NumPy array"),
+        (npy("|b1", 40, 40, &cells[1..]), "has 1599 bytes of elements, not those of its shape"),
+        (npy("|b1", 1, 4, &[0; 4]), "keeps nothing free"),
+        (npy("<U1", 1, 1, &[0; 4]), "has elements of type <U1; allowed: booleans and numbers"),
+        (npy("|b1", 0, 4, &[]), "4 x 0 cells; allowed: 1 to"),
+        (b"\x89PNG\r\n\x1a\n".to_vec(), "not a valid PNG image"),
+    ] {
+        std::fs::write(folder.path().join("mask.npy"), content).expect("a file");
+        let message = load_text("s.toml", text, folder.path(), &[]).expect_err(words).to_string();
+        assert!(message.starts_with("s.toml:13: keep_out[0].mask: ") && message.contains(words), "{message}");
+    }
 }

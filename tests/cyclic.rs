@@ -61,6 +61,39 @@ fn a_cycle_may_turn_and_go_from_wave_to_wave() {
 }
 
 #[test]
+fn a_cycle_may_begin_in_the_air() {
+    let quick = text("kind = \"flat\"", 0.25, "")
+        .replace("duty = 0.6", "duty = 0.4\ncycle = 0.5")
+        .replace("speed = 0.4", "speed = 0.5");
+    let plan = solved(&format!("time_step = 0.025\n{quick}"));
+    assert!(plan.foot_contact[..4].iter().any(|stands| !stands));
+    assert!(
+        plan.swing_beyond.iter().flatten().filter(|beyond| **beyond > 0.0).count() >= 4,
+        "{:?}",
+        plan.swing_beyond
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("p.plan.npz");
+    plan.write(&path).expect("a file");
+    let again = Plan::read(&path).expect("a plan");
+    assert_eq!(again.swing_beyond, plan.swing_beyond);
+    // The splines go through the samples, over the ends too.
+    let exact = again.motion().expect("splines");
+    for (n, t) in plan.t.iter().enumerate().step_by(7) {
+        for e in 0..4 {
+            let position = exact.foot(e, *t).expect("a foot").position;
+            assert!(
+                (0..3).all(|c| (position[c] - plan.foot_position[4 * n + e][c]).abs() < 1e-9),
+                "{t} s, foot {e}"
+            );
+        }
+    }
+    let mut spoiled = plan.clone();
+    spoiled.swing_beyond[0] = [0.5, 0.5];
+    assert!(spoiled.motion().is_err() || failed(&spoiled).iter().any(|name| name == "spline_feet"));
+}
+
+#[test]
 fn ground_that_does_not_repeat_itself_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("s.toml");

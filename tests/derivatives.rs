@@ -419,3 +419,16 @@ fn a_cyclic_motion_has_true_derivatives() {
     assert!(problem.blocks().any(|(block, _)| block.name() == "closure" && block.rows() == 4 + 12 + 4 * 5));
     check(problem, "cyclic");
 }
+
+#[test]
+fn feet_in_the_air_at_the_start_have_true_derivatives() {
+    let start = "[start.state]\nvelocity = [0.3, 0.1, -0.05]\nswings = [[0.1, 0.25], [0.0, 0.0], [0.0, 0.0], [0.2, 0.13]]\n\
+                 feet = [[0.6, 0.4, 0.1], [0.6, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.15]]\n\
+                 feet_velocity = [[0.5, 0.0, 0.1], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.6, 0.1, -0.2]]\n";
+    for formulation in ["direct", "hybrid"] {
+        let (name, terrain) = TERRAINS[4];
+        let problem = problem(terrain, formulation, start);
+        assert!(problem.blocks().any(|(block, _)| block.name() == "feet at start" && block.rows() == 12));
+        check(problem, &format!("{name} {formulation} in the air"));
+    }
+}

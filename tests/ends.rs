@@ -62,6 +62,58 @@ fn a_plan_goes_on_where_another_ends_in_motion_or_at_rest() {
 }
 
 #[test]
+fn a_plan_goes_on_from_the_middle_of_a_step() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for formulation in ["direct", "hybrid"] {
+        let head = format!("formulation = \"{formulation}\"\n{GROUND}[robot]\nname = \"anymal_towr\"\n");
+        let first = plan(
+            folder.path(),
+            &format!("{head}[start]\nposition = [-0.5, 0.0]\n[goal]\nposition = [0.0, 0.1]\n"),
+        );
+        first.write(&folder.path().join("first.plan.npz")).expect("a file");
+        // The middle of a swing, and not a sample of the planner.
+        let n = (100..first.t.len())
+            .find(|n| (n - 3..n + 3).all(|n| !first.foot_contact[4 * n]))
+            .expect("a swing");
+        let text = format!(
+            "{head}[start]\nplan = \"first.plan.npz\"\ntime = {:?}\n[goal]\nposition = [0.3, 0.1]\n",
+            first.t[n]
+        );
+        let second = plan(folder.path(), &text);
+        assert_eq!(second.foot_contact[..4], first.foot_contact[4 * n..4 * n + 4]);
+        for (what, a, b) in [
+            ("base", &first.base_position[n..=n], &second.base_position[..1]),
+            ("velocity", &first.base_linear_velocity[n..=n], &second.base_linear_velocity[..1]),
+            ("feet", &first.foot_position[4 * n..4 * n + 4], &second.foot_position[..4]),
+            ("their velocities", &first.foot_velocity[4 * n..4 * n + 4], &second.foot_velocity[..4]),
+        ] {
+            for (a, b) in a.iter().zip(b) {
+                assert!(distance(*a, *b) < 1e-4, "{formulation}: {what} from {a:?} to {b:?}");
+            }
+        }
+        let mut spoiled = second.clone();
+        let e = (0..4).find(|e| !second.foot_contact[*e]).expect("a foot in the air");
+        spoiled.foot_velocity[e][2] += 0.01;
+        assert!(failed(&check(&spoiled).expect("a plan")).iter().any(|row| row.starts_with("start_feet = ")));
+    }
+}
+
+#[test]
+fn a_table_of_phases_begins_and_ends_in_the_air() {
+    let text = "formulation = \"direct\"\nhorizon = 2.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\n\
+                [start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.1, 0.0]\n[gait]\nkind = \"custom\"\n\
+                phases = [[0.0, 0.4, 1.6], [2.0], [0.8, 0.4, 0.8], [1.7, 0.3, 0.0]]\n";
+    let mut plan = plan(".".as_ref(), text);
+    assert_eq!(plan.foot_contact[..4], [false, true, true, true]);
+    assert_eq!(plan.foot_contact[plan.foot_contact.len() - 4..], [true, true, true, false]);
+    let beyond = plan.swing_beyond.as_flattened();
+    assert!(beyond.iter().zip([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]).all(|(a, b)| (a - b).abs() < 1e-9));
+    plan.meta.scenario = plan.meta.scenario.replace("0.0, 0.4, 1.6", "0.5, 0.4, 1.1");
+    let found = failed(&check(&plan).expect("a sound plan"));
+    assert!(found.iter().any(|row| row.starts_with("rest = 1")), "{found:?}");
+}
+
+#[test]
 fn a_motion_starts_with_a_given_velocity_and_the_check_sees_another() {
     let text = format!(
         "formulation = \"direct\"\n{GROUND}[robot]\nname = \"anymal_towr\"\n[start]\nposition = [0.0, 0.0]\nstate = {{ velocity = [0.3, 0.0, 0.0], angular_velocity = [0.0, 0.0, 0.2] }}\n\
@@ -101,6 +153,14 @@ fn starts_that_contradict_themselves_are_refused() {
             "start.state.forces: given without start.state.feet",
         ),
         ("position = [0.0, 0.0]\nstate.feet = [[0.0, 0.0, 0.0]]", "start.state.feet: given 1 rows"),
+        (
+            "position = [0.0, 0.0]\nstate.swings = [[0.1, 0.2], [0.0, 0.0], [0.0, 0.1], [0.0, 0.0]]",
+            "start.state.swings[2]: given [0, 0.1], allowed: for how long",
+        ),
+        (
+            "position = [0.0, 0.0]\nstate.swings = [[0.1, 0.2], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]\n[contact]\nfootholds = \"patches\"",
+            "contact.footholds: patches are for feet that stand",
+        ),
         (
             "position = [0.0, 0.0]\nstate.velocity = [0.1, 0.0, 0.0]\n[physics]\nlegs = \"massive\"",
             "physics.legs: given \"massive\", but the base moves",

@@ -313,6 +313,8 @@ impl Protocol<'_> {
         // The paper's robot walks as it did when the paper was compared with, and plans may use all of the friction, as in the paper.
         let gait = if self.robot == ROBOT { "[gait]\ncycle = 1.0\nduty = 0.75\n\n" } else { "" };
         let contact = if motion.work == Work::Track { "" } else { "[contact]\nfriction_margin = 0.0\n\n" };
+        // Steeper and steeper ground is to be crossed, not to be gone around.
+        let detours = if terrain_key.is_empty() { "" } else { "detours = false\n" };
         let ([x, y], [u, v]) = (route.start, route.goal);
         format!(
             "# {name}, written by warpgait bench\n\
@@ -320,7 +322,7 @@ impl Protocol<'_> {
              [robot]\nname = \"{}\"\nadhesive_feet = [{adhesive}]\n\n\
              [terrain]\nkind = \"{terrain}\"\nlevel = \"{level}\"\n{terrain_key}\
              extent = [-{HALF_EXTENT:?}, {HALF_EXTENT:?}, -{HALF_EXTENT:?}, {HALF_EXTENT:?}]\n\n\
-             [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n\n\
+             [start]\nposition = [{x:.6}, {y:.6}]\n\n[goal]\nposition = [{u:.6}, {v:.6}]\n{detours}\n\
              {gait}{contact}{discretization}[solver]\nmax_iterations = 200\ntolerance = {TOLERANCE:e}\n\n\
              [map]\n",
             self.robot
@@ -364,6 +366,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_routes_of_table_one_go_straight() {
+        let cases = cases(Bench::Table1, &BenchOptions::default());
+        let mut count = 0;
+        for case in cases.iter().filter(|case| case.method == "direct") {
+            let coarse = ["terrain.spacing=0.05".into()];
+            let loaded = scenario::load_text(&case.name, &case.scenario, ".".as_ref(), &coarse).unwrap();
+            let ground = terrain::build(&loaded.scenario, &loaded.base_dir).unwrap();
+            let surfaces = terrain::Surfaces::of(&loaded.scenario, &loaded.robot, &ground).unwrap();
+            assert!(
+                loaded.scenario.goal.detours && surfaces.bends.iter().all(Vec::is_empty),
+                "{}",
+                case.name
+            );
+            count += 1;
+        }
+        assert!(count >= 78, "{count}");
     }
 
     #[test]

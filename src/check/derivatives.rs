@@ -101,7 +101,7 @@ fn feet(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     let [mut velocity, mut acceleration, mut standing] = [Worst::default(); 3];
     for e in 0..s.feet {
         let at = |values: &[[f64; 3]], n: usize| values[n * s.feet + e];
-        let knots = knots_of(&plan.phase_durations[e], free);
+        let knots = knots_of(&plan.phases(e), free);
         for n in 0..s.samples {
             if s.in_contact(n, e) {
                 let [v, a] = [&plan.foot_velocity, &plan.foot_acceleration].map(|values| norm(at(values, n)));
@@ -143,17 +143,12 @@ fn feet(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
 }
 
 /// Times, s, at which a foot's acceleration may jump or have a kink: the knots of its swings.
-fn knots_of(durations: &[f64], free: usize) -> Vec<f64> {
+fn knots_of(phases: &[[f64; 2]], free: usize) -> Vec<f64> {
     let (all, _) = swing_knots(free);
-    let mut knots = Vec::new();
-    let mut start = 0.0;
-    for (i, duration) in durations.iter().enumerate() {
-        if i % 2 == 1 {
-            knots.extend(all[3..all.len() - 3].iter().map(|u| start + u * duration));
-        }
-        start += duration;
-    }
-    knots
+    let swings = phases.iter().skip(1).step_by(2);
+    swings
+        .flat_map(|[start, end]| all[3..all.len() - 3].iter().map(move |u| start + u * (end - start)))
+        .collect()
 }
 
 /// Unit length, and no flips of the sign between samples.

@@ -43,9 +43,11 @@ fn rest(s: &Subject, findings: &mut Vec<Finding>) {
         ] {
             worst.meet(factor * norm(sub(values[n], asked)), n, None);
         }
-        for e in (0..s.feet).filter(|&e| !s.in_contact(n, e)) {
-            // A foot in the air at the beginning or the end is not at rest, whatever its velocity.
-            worst.meet(1.0, n, Some(e));
+        for e in 0..s.feet {
+            let [at_start, at_end] = s.scenario.in_air(e);
+            let in_air = if n == 0 { at_start } else { at_end };
+            // A foot that is in the air there unasked is not at rest, whatever its velocity.
+            worst.meet(f64::from(u8::from(s.in_contact(n, e) == in_air)), n, Some(e));
         }
     }
     findings.push((laws::REST, worst));
@@ -67,6 +69,13 @@ fn given(s: &Subject, state: &StartState, findings: &mut Vec<Finding>) {
     }
     for (e, asked) in state.forces.iter().flatten().enumerate().take(s.feet) {
         force.meet(100.0 / s.weight * norm(sub(s.foot_force(0, e), *asked)), 0, Some(e));
+    }
+    if let Some(velocities) = &state.feet_velocity {
+        let mut worst = Worst::default();
+        for (e, asked) in velocities.iter().enumerate().take(s.feet).filter(|(e, _)| !s.in_contact(0, *e)) {
+            worst.meet(norm(sub(plan.foot_velocity[e], *asked)), 0, Some(e));
+        }
+        findings.push((laws::START_FEET, worst));
     }
     findings.push((laws::START_STATE, place));
     findings.push((laws::START_TURN, turn));

@@ -75,7 +75,7 @@ laws! {
     STANCE_MOTION = "stance_motion", "m/s", Some(1e-6), None,
         "a standing foot has no velocity, and no acceleration over 0.1 s";
     REST = "rest", "m/s", Some(1e-6), None,
-        "at both ends the base has no velocity, and no acceleration over 0.1 s (rotations: times 0.3 m), and all feet stand (1 otherwise)";
+        "at both ends the base has no velocity, and no acceleration over 0.1 s (rotations: times 0.3 m), and all feet stand, but for those that gait.phases or start.state.swings have in the air (1 otherwise)";
     QUATERNION = "quaternion", "1", Some(1e-6), None, "quaternions have unit length and keep their sign";
     STANCE_GAP = "stance_gap", "mm", Some(1.0), None, "a standing foot is on the ground";
     STANCE_SLIP = "stance_slip", "mm", Some(0.1), None, "a standing foot does not move";
@@ -112,6 +112,7 @@ laws! {
         "how far smoothing moved the ground under a foothold, which may be anywhere";
     START = "start", "mm", Some(1.0), None, "distance from start.position at the beginning";
     START_STATE = "start_state", "mm", Some(1.0), None, "distance of the base's height and of the feet from start.state at the beginning";
+    START_FEET = "start_feet", "m/s", Some(1e-3), None, "difference of the velocities of feet in the air from start.state.feet_velocity at the beginning";
     START_TURN = "start_turn", "rad", Some(1e-3), None, "difference of the orientation from start.state.tilt and the heading at the beginning";
     START_FORCE = "start_force", "% m g", Some(0.5), None, "difference of the forces from start.state.forces at the beginning";
     START_YAW = "start_yaw", "rad", Some(1e-3), None, "difference from start.yaw, or the way to the first way-point or the goal, at the beginning";

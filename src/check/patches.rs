@@ -44,9 +44,9 @@ pub(super) fn patch_at<'a>(s: &Subject<'a>, stances: &[usize], n: usize, e: usiz
     s.plan.patches.get(e)?.get(stances[n]).filter(|_| standing).map(PlanPatch)
 }
 
-/// For each sample, how many stances of a foot are over.
+/// For each sample, how many stances of a foot are over; one that is in the air at the start has one behind it.
 pub(super) fn stance_numbers(s: &Subject, e: usize) -> Vec<usize> {
-    let mut over = 0;
+    let mut over = usize::from(!s.in_contact(0, e));
     (0..s.samples)
         .map(|n| {
             over += usize::from(n > 0 && s.in_contact(n - 1, e) && !s.in_contact(n, e));

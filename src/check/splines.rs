@@ -155,15 +155,14 @@ fn feet(s: &Subject, splines: &Splines, findings: &mut Vec<Finding>) {
 /// Where a foot is at t in the space of the variables, whether it swings, and whether a switch is so near that this is rounding.
 fn foot(s: &Subject, splines: &Splines, e: usize, t: f64) -> ([f64; 3], bool, bool) {
     let (footholds, swings) = (splines.footholds[e], splines.swings[e]);
-    let (mut start, mut near) = (0.0, false);
-    for (i, duration) in s.plan.phase_durations[e].iter().enumerate() {
-        let end = start + duration;
+    let mut near = false;
+    for (i, [start, end]) in s.plan.phases(e).into_iter().enumerate() {
         near |= i > 0 && (t - start).abs() < SWITCH;
         let (stance, in_swing) = (i / 2, i % 2 == 1);
         if in_swing && t > start && t < end {
             let [a, b] = [footholds[stance], footholds[stance + 1]];
             let (knots, ends) = swing_knots(splines.free);
-            let knots: Vec<f64> = knots.iter().map(|u| start + u * duration).collect();
+            let knots: Vec<f64> = knots.iter().map(|u| start + u * (end - start)).collect();
             let free = &swings[splines.free * stance..][..splines.free];
             let place = cubic(&knots, &[&vec![a; ends], free, &vec![b; ends]].concat(), t);
             return (place, true, near || (t - end).abs() < SWITCH);
@@ -171,7 +170,6 @@ fn foot(s: &Subject, splines: &Splines, e: usize, t: f64) -> ([f64; 3], bool, bo
         if !in_swing && t <= end {
             return (footholds[stance], false, near || (t - end).abs() < SWITCH);
         }
-        start = end;
     }
     (footholds[footholds.len() - 1], false, near)
 }

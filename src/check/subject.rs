@@ -143,14 +143,8 @@ impl<'a> Subject<'a> {
 
     /// Lift-off and touch-down of the swing of a foot around a time, s.
     fn switches(&self, e: usize, time: f64) -> Option<[f64; 2]> {
-        let mut start = 0.0;
-        for (i, duration) in self.plan.phase_durations[e].iter().enumerate() {
-            if i % 2 == 1 && (start..=start + duration).contains(&time) {
-                return Some([start, start + duration]);
-            }
-            start += duration;
-        }
-        None
+        let mut swings = self.plan.phases(e).into_iter().skip(1).step_by(2);
+        swings.find(|[start, end]| (*start..=*end).contains(&time))
     }
 
     /// Whether the ground has edges, so that feet stand on patches.

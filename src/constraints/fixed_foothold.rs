@@ -16,7 +16,7 @@ pub fn fixed_footholds(model: &Model) -> LinearRows {
     for fixed in &model.fixed {
         let start = model.layout.feet[fixed.foot].stances[fixed.stance].stance.start;
         for (c, at) in fixed.position.into_iter().enumerate() {
-            let mut row = LinearRow::at(start.ceil() as usize, [at; 2]);
+            let mut row = LinearRow::at((start.ceil() as usize).min(model.layout.intervals), [at; 2]);
             let mut by = Vector3::zeros();
             by[c] = 1.0;
             row.footholds.push((fixed.foot, fixed.stance, by));

@@ -125,6 +125,17 @@ impl Document {
         }
     }
 
+    /// Replaces values of a table of an array by one, which keeps their places in messages.
+    pub fn replace_in(&mut self, array: &str, index: usize, old: &[&str], key: &str, value: Value) {
+        let items = self.table.get_mut(array).and_then(Value::as_array_mut);
+        if let Some(Value::Table(item)) = items.and_then(|items| items.get_mut(index)) {
+            old.iter().for_each(|old| {
+                item.remove(*old);
+            });
+            item.insert(key.to_owned(), value);
+        }
+    }
+
     /// Its name in messages.
     pub fn file(&self) -> &str {
         &self.file

@@ -221,7 +221,8 @@ impl NodeCurvature {
         let (foothold, tangent) = (&stance.foothold, Tangent::foot(model, contact, &stance.foothold));
         let mut form = Matrix3::zeros();
         let stands = |&instant: &Instant| model.layout.phase_at(i, instant) == Phase::Stance(j);
-        let samples = stance.stance.start.floor() as usize..=stance.stance.end.ceil() as usize;
+        let within = |time: f64| time.clamp(0.0, model.layout.intervals as f64) as usize;
+        let samples = within(stance.stance.start.floor())..=within(stance.stance.end.ceil());
         let between =
             (0..state.swings_between[i].len()).filter(|k| samples.contains(k)).map(Instant::Between);
         for instant in samples.clone().map(Instant::Sample).chain(between).filter(stands) {

@@ -196,16 +196,24 @@ impl Model {
         self.patches.get(foot).map(|stances| &stances[stance])
     }
 
-    /// When a stance is halfway over, in samples ([`crate::trajectory::Stance::middle`]); in a cyclic motion, where one that begins or ends with the motion is part
-    /// of a longer one, the middle of that, which may be before the start or after the end.
+    /// When a stance is halfway over, in samples ([`crate::trajectory::Stance::middle`]); in a cyclic motion, where one that begins or ends with
+    /// the motion is part of a longer one, the middle of that, and where it is beyond a swing over the start or the end, that of the one that it
+    /// repeats. These may be before the start or after the end.
     pub fn halfway(&self, foot: usize, stance: usize) -> f64 {
         let (last, stances) = (self.layout.intervals as f64, &self.layout.feet[foot].stances);
         let this = &stances[stance].stance;
         if self.cycle.is_none() {
             return this.middle(last);
         }
-        let start = if stance == 0 { stances[stances.len() - 1].stance.start - last } else { this.start };
-        let end = if stance + 1 == stances.len() { stances[0].stance.end + last } else { this.end };
+        let after = stances.len() - 1;
+        if this.end < 0.0 {
+            return self.halfway(foot, after - 1) - last;
+        }
+        if this.start > last {
+            return self.halfway(foot, 1) + last;
+        }
+        let start = if stance == 0 { stances[after].stance.start - last } else { this.start };
+        let end = if stance == after { stances[0].stance.end + last } else { this.end };
         0.5 * (start + end)
     }
 

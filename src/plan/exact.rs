@@ -112,7 +112,8 @@ impl Plan {
             .phase_durations
             .iter()
             .zip(&self.foot_names)
-            .map(|(durations, foot)| swings(durations, foot, time_step, intervals))
+            .zip(&self.swing_beyond)
+            .map(|((durations, foot), beyond)| swings(durations, *beyond, foot, time_step, intervals))
             .collect::<Result<Vec<_>>>()?;
         if swings.len() != self.foot_names.len() {
             return Err(Error::input("member phase_durations: needs one row for each of foot_names"));
@@ -205,8 +206,14 @@ impl Plan {
     }
 }
 
-/// The swings of a foot from its phase durations, s.
-fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Result<Vec<Swing>> {
+/// The swings of a foot from its phase durations and those beyond the ends, s.
+fn swings(
+    durations: &[f64],
+    beyond: [f64; 2],
+    foot: &str,
+    time_step: f64,
+    intervals: usize,
+) -> Result<Vec<Swing>> {
     let refuse = |what: String| Err(Error::input(format!("member phase_durations of {foot}: {what}")));
     if durations.len().is_multiple_of(2) {
         return refuse(format!(
@@ -216,10 +223,12 @@ fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Re
     }
     let mut edges = vec![0.0];
     let mut time = 0.0;
-    for duration in durations {
+    for (n, duration) in durations.iter().enumerate() {
         time += duration;
         let k = snapped(time / time_step);
-        if !(k > edges[edges.len() - 1] && k <= intervals as f64) {
+        // Only a stance beside a swing at an end has no duration.
+        let none = *duration == 0.0 && durations.len() > 1 && (n == 0 || n + 1 == durations.len());
+        if !((k > edges[edges.len() - 1] || none) && k <= intervals as f64) {
             return refuse(format!(
                 "a switch at {time:?} s is not after the one before it and within the plan"
             ));
@@ -229,7 +238,20 @@ fn swings(durations: &[f64], foot: &str, time_step: f64, intervals: usize) -> Re
     if edges[durations.len()] != intervals as f64 {
         return refuse(format!("they end at {time:?} s, the base at {} s", intervals as f64 * time_step));
     }
-    Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
+    let mut swings: Vec<Swing> =
+        (1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect();
+    let ends = [0, durations.len() - 1];
+    if let Some(n) = (0..2).find(|&n| beyond[n] > 0.0 && (swings.is_empty() || durations[ends[n]] > 0.0)) {
+        let end = ["start", "end"][n];
+        return refuse(format!("the foot stands at the {end}, but swing_beyond has {:?} s there", beyond[n]));
+    }
+    if let Some(first) = swings.first_mut() {
+        first.start -= beyond[0] / time_step;
+    }
+    if let Some(last) = swings.last_mut() {
+        last.end += beyond[1] / time_step;
+    }
+    Ok(swings)
 }
 
 fn wrong(member: &str, what: impl std::fmt::Display) -> Error {

@@ -57,8 +57,11 @@ pub struct Plan {
     pub legs: Option<LegSamples>,
     /// Counterparts in F, when planned there.
     pub warped: Option<WarpedSamples>,
-    /// Alternating stance and swing durations by foot, s, stance first.
+    /// Alternating stance and swing durations within the plan by foot, s, stance first; a foot that begins or ends in the air has a stance
+    /// without duration there.
     pub phase_durations: Vec<Vec<f64>>,
+    /// By foot, s: for how long the first swing lasted before the start, and the last one goes on after the end; zero where the foot stands.
+    pub swing_beyond: Vec<[f64; 2]>,
     /// Spline coefficients and knots by member name under `spline/`: (name, shape, values in C order).
     pub splines: Vec<NamedArray>,
     /// The ground as planned on.
@@ -79,6 +82,26 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Start and end of each phase of a foot, s, stance and swing in turn, stance first. Swings over the start or the end are whole; the stance
+    /// beyond them has no duration.
+    pub fn phases(&self, foot: usize) -> Vec<[f64; 2]> {
+        let (durations, [before, after]) = (&self.phase_durations[foot], self.swing_beyond[foot]);
+        let mut time = 0.0;
+        let mut edges = vec![0.0];
+        edges.extend(durations.iter().map(|duration| {
+            time += duration;
+            time
+        }));
+        let last = edges.len() - 1;
+        if before > 0.0 {
+            edges[..2.min(last + 1)].fill(-before);
+        }
+        if after > 0.0 {
+            edges[last.saturating_sub(1)..].fill(time + after);
+        }
+        edges.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+    }
+
     /// SHA-256 (hexadecimal) of the history and the largest violation, as in `meta.solver`.
     pub fn history_sha256(&self) -> String {
         let columns = [&self.history_objective, &self.history_constraint_violation, &self.history_seconds];

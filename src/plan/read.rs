@@ -67,6 +67,7 @@ impl Plan {
             warped,
             legs,
             phase_durations: read_phases(&mut npz, e)?,
+            swing_beyond: read_beyond(&mut npz, e)?,
             splines: read_splines(&mut npz)?,
             ground: read_ground(&mut npz)?,
             patches: read_patches(&mut npz, e)?,
@@ -108,6 +109,20 @@ fn read_meta(npz: &mut NpzReader) -> Result<Meta> {
         );
     }
     Ok(meta)
+}
+
+/// (E, 2), zero in plans that have none.
+fn read_beyond(npz: &mut NpzReader, feet: usize) -> Result<Vec<[f64; 2]>> {
+    let name = "swing_beyond";
+    if !npz.has(name) {
+        return Ok(vec![[0.0; 2]; feet]);
+    }
+    let values = npz.f64(name, &[feet, 2])?;
+    if let Some(at) = values.iter().position(|v| !v.is_finite() || *v < 0.0) {
+        let what = format!("{} at [{}, {}], expected a duration in s", values[at], at / 2, at % 2);
+        return Err(npz.error(name, what));
+    }
+    Ok(values.as_chunks::<2>().0.to_vec())
 }
 
 /// (E, P), padded with NaN at the end of each row.

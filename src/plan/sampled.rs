@@ -105,6 +105,7 @@ impl Plan {
                 }),
             }),
             phase_durations: phase_durations(&model.layout),
+            swing_beyond: swing_beyond(&model.layout),
             splines: splines(motion),
             ground: ground_grid(provenance.ground),
             patches: patches(model),
@@ -134,10 +135,22 @@ fn patches(model: &Model) -> Vec<Vec<[[f64; 3]; 4]>> {
     model.patches.iter().map(|stances| stances.iter().map(Patch::corners).collect()).collect()
 }
 
-/// Stance and swing durations by foot, s.
-fn phase_durations(layout: &Layout) -> Vec<Vec<f64>> {
+/// By how much swings go beyond the start and the end by foot, s.
+fn swing_beyond(layout: &Layout) -> Vec<[f64; 2]> {
     let of = |foot: &FootVariables| {
-        let edges: Vec<f64> = foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]).collect();
+        let before = foot.swings.first().map_or(0.0, |s| -s.swing.start);
+        let after = foot.swings.last().map_or(0.0, |s| s.swing.end - layout.intervals as f64);
+        [before, after].map(|beyond| beyond.max(0.0) * layout.time_step)
+    };
+    layout.feet.iter().map(of).collect()
+}
+
+/// Stance and swing durations within the motion by foot, s.
+fn phase_durations(layout: &Layout) -> Vec<Vec<f64>> {
+    let within = |time: f64| time.clamp(0.0, layout.intervals as f64);
+    let of = |foot: &FootVariables| {
+        let edges = foot.stances.iter().flat_map(|s| [s.stance.start, s.stance.end]);
+        let edges: Vec<f64> = edges.map(within).collect();
         edges.windows(2).map(|e| (e[1] - e[0]) * layout.time_step).collect()
     };
     layout.feet.iter().map(of).collect()

@@ -49,6 +49,9 @@ impl Plan {
             durations.iter().copied().chain(std::iter::repeat_n(f64::NAN, phases - durations.len()))
         });
         npz.add_f64("phase_durations", &[e, phases], padded)?;
+        if self.swing_beyond.iter().flatten().any(|beyond| *beyond > 0.0) {
+            npz.add_f64("swing_beyond", &[e, 2], self.swing_beyond.iter().flatten().copied())?;
+        }
         for (name, shape, values) in &self.splines {
             npz.add_f64(&format!("spline/{name}"), shape, values.iter().copied())?;
         }
@@ -149,6 +152,7 @@ impl Plan {
         )?;
         ensure("foot_contact", self.foot_contact.len() == n * e, [])?;
         ensure("foot_adhesive", self.foot_adhesive.len() == e, [])?;
+        ensure("swing_beyond", self.swing_beyond.len() == e, self.swing_beyond.iter().flatten())?;
         ensure("phase_durations", self.phase_durations.len() == e, self.phase_durations.iter().flatten())?;
         if let Some(warped) = &self.warped {
             if let Some(base) = &warped.base {

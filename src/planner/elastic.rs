@@ -20,7 +20,7 @@ use super::options;
 use super::problem::GaitProblem;
 use super::stopping::StoppingRule;
 use crate::ipopt::{self, IterationRecord, NlpProblem};
-use crate::scenario::{Effort, Hessian, Scenario, SolverSpec};
+use crate::scenario::{Effort, Hessian, SolverSpec};
 
 /// Rows of a block and a foot that act within this time share a slack, s.
 const WINDOW: f64 = 0.25;
@@ -406,30 +406,4 @@ fn exceeded(problem: &mut GaitProblem, x: &[f64]) -> Vec<Shortfall> {
     }
     runs.sort_by(|a, b| b.0.total_cmp(&a.0));
     runs.into_iter().map(|(_, shortfall)| shortfall).collect()
-}
-
-/// If all that gives belongs to one key of the scenario: that key, and the value that would do, with a little to spare.
-pub(super) fn remedy(scenario: &Scenario, shortfalls: &[Shortfall]) -> Option<(&'static str, f64, f64)> {
-    let block = &shortfalls.first()?.block;
-    if shortfalls.iter().any(|shortfall| shortfall.block != *block) {
-        return None;
-    }
-    let most = shortfalls.iter().map(|shortfall| shortfall.amount).fold(0.0, f64::max);
-    let motion = &scenario.motion;
-    let lower = |value: f64, by: f64| (((value - 1.1 * by) * 1e3).floor() / 1e3).max(0.0);
-    match block.as_str() {
-        "swing clearance" => Some((
-            "motion.swing_clearance",
-            lower(motion.swing_clearance, 1e-3 * most),
-            motion.swing_clearance,
-        )),
-        "base clearance" => {
-            Some(("motion.base_clearance", lower(motion.base_clearance, 1e-3 * most), motion.base_clearance))
-        }
-        "normal force" => {
-            let limit = ((motion.force_limit + 1.1e-2 * most) * 1e2).ceil() / 1e2;
-            Some(("motion.force_limit", limit, motion.force_limit))
-        }
-        _ => None,
-    }
 }

@@ -1,9 +1,10 @@
 //! The one place where the problem is composed: variables with bounds, constraint blocks, costs, and their sparse derivatives.
 
 use crate::constraints::base_clearance::BaseClearance;
-use crate::constraints::closure::Closure;
+use crate::constraints::closure::closure;
 use crate::constraints::durations::Durations;
 use crate::constraints::dynamics::Dynamics;
+use crate::constraints::feet_at_start::feet_at_start;
 use crate::constraints::fixed_foothold::fixed_footholds;
 use crate::constraints::foothold_patch::FootholdPatch;
 use crate::constraints::foothold_slope::FootholdSlope;
@@ -28,6 +29,7 @@ use crate::costs::swing_acceleration::SwingAcceleration;
 use crate::ipopt::{Multipliers, NlpProblem};
 use crate::scenario::{Cone, Law, PostureSpec, Scenario};
 use crate::trajectory::base::RATES;
+use crate::trajectory::variables::FootVariables;
 
 use std::sync::Arc;
 
@@ -111,7 +113,12 @@ impl GaitProblem {
             Box::new(goal(&model, scenario)),
         ];
         if let Some(cycle) = &model.cycle {
-            blocks.push(Box::new(Closure::new(&model, cycle)));
+            blocks.push(Box::new(closure(&model, cycle)));
+        }
+        if let Some(start) =
+            model.start.as_ref().filter(|_| model.layout.feet.iter().any(FootVariables::starts_in_air))
+        {
+            blocks.push(Box::new(feet_at_start(&model, start)));
         }
         if scenario.posture != PostureSpec::default() {
             blocks.push(Box::new(posture(&model, &scenario.posture)));

@@ -69,14 +69,16 @@ fn start(scenario: &Scenario, model: &Model) -> Result<Option<Start>> {
             .collect()
     });
     let footholds = places.transpose()?;
-    let forces = state.forces.as_ref().zip(footholds.as_ref()).map(|(forces, footholds)| {
-        let of_foot = |(force, foothold): (&[f64; 3], &Vector3<f64>)| {
-            let jacobian = model.spaces.feet.jet(foothold, Order::First).jacobian;
-            jacobian.try_inverse().unwrap_or_else(Matrix3::identity) * Vector3::from(*force) / unit
-        };
-        forces.iter().zip(footholds).map(of_foot).collect()
-    });
-    Ok(Some(Start { base, rates: rates(model, &pose, state), footholds, forces }))
+    let back = |place: &Vector3<f64>, vector: &[f64; 3]| {
+        let jacobian = model.spaces.feet.jet(place, Order::First).jacobian;
+        jacobian.try_inverse().unwrap_or_else(Matrix3::identity) * Vector3::from(*vector)
+    };
+    let of_feet = |vectors: &Option<Vec<[f64; 3]>>, scale: f64| -> Option<Vec<Vector3<f64>>> {
+        let (vectors, places) = (vectors.as_ref()?, footholds.as_ref()?);
+        Some(vectors.iter().zip(places).map(|(vector, place)| back(place, vector) * scale).collect())
+    };
+    let (forces, feet_velocity) = (of_feet(&state.forces, unit.recip()), of_feet(&state.feet_velocity, 1.0));
+    Ok(Some(Start { base, rates: rates(model, &pose, state), footholds, feet_velocity, forces }))
 }
 
 /// The first and second derivatives of roll, pitch and yaw: ω = Σ w_d θ̇_d, ω̇ = Σ w_d θ̈_d + Σ ∂_e w_d θ̇_e θ̇_d.

@@ -137,8 +137,8 @@ fn from_above(svg: &mut Svg, plan: &Plan, ground: &DrawnGround, frame: [f64; 4])
                 svg.circle(axes.at(x, y), 4.0, &style);
             }
         }
-        for polygon in &conditions.keep_out {
-            svg.polygon(polygon.polygon.iter().map(|[x, y]| axes.at(*x, *y)), KEPT_FREE);
+        for corners in conditions.keep_out.iter().flat_map(KeepOutSpec::loops) {
+            svg.polygon(corners.iter().map(|[x, y]| axes.at(*x, *y)), KEPT_FREE);
         }
         if conditions.way.len() > 2 {
             svg.polyline(conditions.way.iter().map(|[x, y]| axes.at(*x, *y)), WAY);

@@ -14,7 +14,8 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
     }
     forces(document, scenario)?;
     footholds(document, scenario)?;
-    keep_out(document, scenario)
+    keep_out(document, scenario)?;
+    robot.map_or(Ok(()), |robot| kept_free(document, scenario, robot))
 }
 
 fn posture(document: &Document, scenario: &Scenario) -> Result<()> {
@@ -110,10 +111,66 @@ fn feet(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
     Ok(())
 }
 
-/// Polygons have an area, and neither the ends of the way nor what must be stepped on is inside of them.
+/// The key of a place that is kept free.
+fn keep_out_key(scenario: &Scenario, n: usize) -> String {
+    format!("keep_out[{n}].{}", scenario.keep_out[n].key())
+}
+
+/// Places along each side of a reach box at which a foot may stand.
+const BOX_SAMPLES: i32 = 8;
+
+/// Every foot has a place to stand outside of the polygons, at the start, and at the goal where the heading there is known.
+fn kept_free(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+    let radius = robot.foot_radius();
+    let within = |place: [f64; 2]| scenario.keep_out.iter().position(|spec| spec.distance(place) < radius);
+    for (e, [x, y, _]) in
+        scenario.start.state.iter().flat_map(|state| state.feet.iter().flatten()).enumerate()
+    {
+        let stands = !scenario.in_air(e)[0];
+        if let Some(n) = within([*x, *y]).filter(|_| stands) {
+            let polygon = document.place(&keep_out_key(scenario, n));
+            let what = format!("given [{x}, {y}], which is kept free of feet ({polygon})");
+            return Err(document.error(&format!("start.state.feet[{e}]"), what));
+        }
+    }
+    let goal_yaw = scenario.goal_yaw().or(scenario.stops().is_empty().then(|| scenario.start_yaw()));
+    let ends = [
+        ("start.position", scenario.start.position, Some(scenario.start_yaw())),
+        ("goal.position", scenario.goal.position, goal_yaw),
+    ];
+    for (key, [x, y], yaw) in ends {
+        let Some((sin, cos)) = yaw.map(f64::sin_cos) else { continue };
+        for foot in &robot.feet {
+            let steps = -BOX_SAMPLES..=BOX_SAMPLES;
+            let along = |c: usize, n: i32| {
+                foot.reach.center[c] + foot.reach.half_size[c] * f64::from(n) / f64::from(BOX_SAMPLES)
+            };
+            let places = steps.clone().flat_map(|i| steps.clone().map(move |j| (i, j))).map(|(i, j)| {
+                let (u, v) = (along(0, i), along(1, j));
+                [x + cos * u - sin * v, y + sin * u + cos * v]
+            });
+            let blocked: Option<Vec<usize>> = places.map(within).collect();
+            if let Some(n) = blocked.and_then(|polygons| polygons.first().copied()) {
+                let polygon = document.place(&keep_out_key(scenario, n));
+                let what = format!(
+                    "given [{x}, {y}], where foot {} finds no place to stand: all that it reaches is kept free of feet ({polygon})",
+                    foot.name
+                );
+                return Err(document.error(key, what));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Polygons have an area, and what must be stepped on is not inside of them.
 fn keep_out(document: &Document, scenario: &Scenario) -> Result<()> {
     for (n, spec) in scenario.keep_out.iter().enumerate() {
-        let key = format!("keep_out[{n}].polygon");
+        let key = keep_out_key(scenario, n);
+        if spec.loops().next().is_none() {
+            let what = "gives neither a polygon nor a mask with something in it; give one of them";
+            return Err(document.error(&format!("keep_out[{n}]"), what));
+        }
         if spec.doubled_area() < 1e-6 {
             let what =
                 "its corners are on a line, or its parts cancel; allowed: corners in order around an area";

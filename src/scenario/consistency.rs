@@ -210,12 +210,18 @@ fn phases(document: &Document, scenario: &Scenario) -> Result<()> {
         return Ok(());
     };
     if scenario.gait.kind != GaitKind::Custom {
-        return Err(document.error("gait.phases", "only allowed with kind = \"custom\""));
+        let place = document.place("gait.kind");
+        let what = format!("only allowed with kind = \"custom\", but {place} is \"{}\"", scenario.gait.kind);
+        return Err(document.error("gait.phases", what));
     }
     for (foot, row) in rows.iter().enumerate() {
         let sum: f64 = row.iter().sum();
         if (sum - scenario.horizon).abs() > PHASE_TOLERANCE {
-            let what = format!("the durations sum to {sum} s, expected the horizon, {} s", scenario.horizon);
+            let what = format!(
+                "the durations sum to {sum} s, expected the horizon, {} s ({})",
+                scenario.horizon,
+                document.place("horizon")
+            );
             return Err(document.error(&format!("gait.phases[{foot}]"), what));
         }
     }

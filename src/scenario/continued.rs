@@ -15,7 +15,7 @@ type Input = (String, String);
 /// Reads what `start.plan` names, if anything, and sets the keys that follow. Returns the file.
 ///
 /// # Errors
-/// For a plan that cannot be read or has a foot in the air at that time, and for keys that it would set.
+/// For a plan that cannot be read, and for keys that it would set.
 pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<Input>> {
     let start = document.table().get("start").and_then(toml::Value::as_table);
     let Some(name) = start.and_then(|start| start.get("plan")).and_then(toml::Value::as_str) else {
@@ -82,12 +82,13 @@ fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'s
     let (_, names) = npz.str("foot_names").map_err(plan)?;
     let e = names.len();
     let contact = npz.bool("foot_contact", &[n, e]).map_err(plan)?;
-    if let Some(foot) = (0..e).find(|foot| !contact[k * e + foot]) {
-        let all = |k: &usize| (0..e).all(|foot| contact[k * e + foot]);
-        let near = (0..n).filter(all).min_by_key(|other| other.abs_diff(k)).map_or(0.0, |k| t[k]);
+    let all_stand = |k: &usize| (0..e).all(|foot| contact[k * e + foot]);
+    let stands = all_stand(&k);
+    if !stands && npz.has("angular_momentum") {
+        // Accelerations and forces that follow from moving legs with mass are not those of a motion with massless ones.
+        let near = (0..n).filter(all_stand).min_by_key(|other| other.abs_diff(k)).map_or(0.0, |k| t[k]);
         let what = Error::input(format!(
-            "at {time} s foot {} is in the air; allowed: a time when all feet stand, such as {near} s",
-            names[foot]
+            "at {time} s a foot is in the air, and the legs of that plan have mass, which those of a motion that starts moving have not; allowed: a time when all feet stand, such as {near} s, or a plan with physics.legs = \"massless\""
         ));
         return Err(("start.time", what));
     }
@@ -95,8 +96,18 @@ fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'s
         Ok(npz.points::<3>(member, &[n, e]).map_err(plan)?[k * e..][..e].to_vec())
     };
     let (feet, forces) = (of_feet("foot_position")?, of_feet("foot_force")?);
+    let velocities = of_feet("foot_velocity")?;
+    let in_air = if stands {
+        Vec::new()
+    } else {
+        let swings = swings(&mut npz, e, t[k]).map_err(plan)?;
+        // As the samples have it, where a switch is near.
+        let of_foot = |foot: usize| if contact[k * e + foot] { [0.0; 2] } else { swings[foot] };
+        let swings: Vec<[f64; 2]> = (0..e).map(of_foot).collect();
+        vec![format!("start.state.swings={swings:?}"), format!("start.state.feet_velocity={velocities:?}")]
+    };
     let [roll, pitch, yaw] = angles(quaternion);
-    Ok(vec![
+    let standing = vec![
         format!("start.position=[{x:?}, {y:?}]"),
         format!("start.yaw={yaw:?}"),
         format!("start.state.height={z:?}"),
@@ -107,7 +118,37 @@ fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'s
         format!("start.state.angular_acceleration={angular_acceleration:?}"),
         format!("start.state.feet={feet:?}"),
         format!("start.state.forces={forces:?}"),
-    ])
+    ];
+    Ok(standing.into_iter().chain(in_air).collect())
+}
+
+/// For how long each foot has been in the air at a time and when it lands after it, s; zeros for one that stands.
+fn swings(npz: &mut NpzReader, feet: usize, time: f64) -> Result<Vec<[f64; 2]>> {
+    let (shape, durations) = npz.any_f64("phase_durations")?;
+    let &[rows, columns] = &shape[..] else {
+        return Err(npz.error("phase_durations", format!("shape {shape:?}, expected ({feet}, P)")));
+    };
+    if rows != feet || columns == 0 {
+        return Err(npz.error("phase_durations", format!("shape {shape:?}, expected ({feet}, P)")));
+    }
+    let beyond =
+        if npz.has("swing_beyond") { npz.f64("swing_beyond", &[feet, 2])? } else { vec![0.0; 2 * feet] };
+    let of_foot = |(row, beyond): (&[f64], &[f64; 2])| {
+        let row = &row[..row.iter().position(|d| d.is_nan()).unwrap_or(columns)];
+        let mut start = 0.0;
+        for (i, duration) in row.iter().enumerate() {
+            let end = start + duration;
+            // Whole swings, also over the ends.
+            let before = if i == 1 { beyond[0] } else { 0.0 };
+            let after = if i + 2 == row.len() { beyond[1] } else { 0.0 };
+            if i % 2 == 1 && (start..=end).contains(&time) {
+                return [time - start + before, end - time + after];
+            }
+            start = end;
+        }
+        [0.0; 2]
+    };
+    Ok(durations.chunks(columns).zip(beyond.as_chunks::<2>().0).map(of_foot).collect())
 }
 
 /// Roll, pitch and yaw of a unit quaternion w, x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll).

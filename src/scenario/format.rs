@@ -103,12 +103,31 @@ impl Scenario {
         self.start.moves() || self.goal.velocity.is_some() || self.gait.periodic
     }
 
+    /// By foot, whether it is in the air at the start and at the end, as far as these are given.
+    pub fn in_air(&self, foot: usize) -> [bool; 2] {
+        let row = self.gait.phases.as_ref().and_then(|rows| rows.get(foot));
+        let none = |duration: Option<&f64>| duration == Some(&0.0);
+        [
+            none(row.and_then(|row| row.first())) || self.start.swing(foot).is_some(),
+            none(row.and_then(|row| row.last())),
+        ]
+    }
+
+    /// Whether a foot is in the air at the start or at the end, as far as that is given.
+    pub fn is_in_air(&self) -> bool {
+        let swings = self.start.state.as_ref().and_then(|state| state.swings.as_ref());
+        let feet = self.gait.phases.as_ref().map_or(0, Vec::len).max(swings.map_or(0, Vec::len));
+        (0..feet).any(|foot| self.in_air(foot) != [false; 2])
+    }
+
     /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is
     /// massless: massive legs cost iterations and reach there (docs/results.md). So it is with flight, in which nothing holds the trunk
-    /// against the legs, and what they add often does not settle, and where the motion starts or ends moving.
+    /// against the legs, and what they add often does not settle, and where the motion starts or ends moving or with feet in the air.
     pub fn legs(&self) -> Legs {
         self.physics.legs.unwrap_or(match self.footholds() {
-            Footholds::Anywhere if !self.gait.flies() && !self.moves_at_ends() => Legs::Massive,
+            Footholds::Anywhere if !self.gait.flies() && !self.moves_at_ends() && !self.is_in_air() => {
+                Legs::Massive
+            }
             _ => Legs::Massless,
         })
     }

@@ -32,8 +32,9 @@ pub struct GaitSpec {
     /// Gaits one after the other, instead of `kind`, `cycle` and `duty`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<Vec<SectionSpec>>,
-    /// custom: for each foot, alternating stance and swing durations in s, stance first; they sum to the horizon.
-    #[schemars(inner(inner(range(min = 0.01, max = 600.0))))]
+    /// custom: for each foot, alternating stance and swing durations in s, stance first; they sum to the horizon. A first or last stance of 0 s
+    /// is none: the foot begins or ends in the air.
+    #[schemars(inner(inner(range(min = 0.0, max = 600.0))))]
     pub phases: Option<Vec<Vec<f64>>>,
 }
 

@@ -30,6 +30,9 @@ pub struct GoalSpec {
     /// The way is an arc.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub circle: Option<CircleSpec>,
+    /// Whether the way may lead around what cannot be walked, where that blocks the straight one.
+    #[serde(default = "default_detours")]
+    pub detours: bool,
     /// Where the way leads, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waypoints: Vec<WaypointSpec>,
@@ -37,6 +40,10 @@ pub struct GoalSpec {
     #[serde(default = "default_distance")]
     #[schemars(range(min = 0.001, max = 10.0))]
     pub waypoint_distance: f64,
+}
+
+fn default_detours() -> bool {
+    true
 }
 
 fn default_distance() -> f64 {

@@ -7,6 +7,7 @@ use super::consistency;
 use super::continued;
 use super::format::Scenario;
 use super::guess::{GivenMotion, GuessSpec};
+use super::mask;
 use super::way;
 use crate::digest::sha256_hex;
 use crate::files;
@@ -24,7 +25,7 @@ pub struct LoadedScenario {
     pub scenario: Scenario,
     /// The robot that it names.
     pub robot: Robot,
-    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, a gait with flight, a plan to go on from, or a robot that is not of
+    /// The scenario in effect, as TOML: the user's own text, or if there are overrides, a speed, a gait with flight, a plan to go on from, a mask, or a robot that is not of
     /// ANYmal's size, all values with these, with the horizon that follows, and with the time step and the lengths that go by gait and size.
     pub effective_text: String,
     /// The user's own text, exactly as it was read.
@@ -38,8 +39,8 @@ pub struct LoadedScenario {
     /// The motion to start the solve from, where it names one.
     pub guess: Option<Arc<GivenMotion>>,
     document: Document,
-    /// The plan that it goes on from.
-    start_plan: Option<PathBuf>,
+    /// The plan that it goes on from, and masks.
+    other_files: Vec<PathBuf>,
     /// The scenario's file; none for one in memory.
     file: Option<PathBuf>,
 }
@@ -50,7 +51,7 @@ impl LoadedScenario {
         let Scenario { robot, terrain, guess, .. } = &self.scenario;
         let guess = guess.as_ref().map(|guess| &*guess.file);
         let named = [robot.file.as_deref(), terrain.file(), guess].into_iter().flatten();
-        let own = self.file.iter().chain(&self.start_plan).cloned();
+        let own = self.file.iter().chain(&self.other_files).cloned();
         named.map(|name| self.base_dir.join(name)).chain(own).collect()
     }
 
@@ -130,6 +131,7 @@ fn assemble(
         document.set(assignment)?;
     }
     let start_plan = continued::expand(&mut document, &base_dir)?;
+    let masks = mask::expand(&mut document, &base_dir)?;
     let scenario = read(&document)?;
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
     way::check_speed(&document, &scenario, &robot)?;
@@ -142,7 +144,7 @@ fn assemble(
     };
     let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
     let by_gait = set_by_gait(&mut document, &scenario)?;
-    let changed = by_size || by_speed || by_gait || start_plan.is_some();
+    let changed = by_size || by_speed || by_gait || start_plan.is_some() || !masks.is_empty();
     let scenario = if changed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
     let guess = given(&document, &scenario, &robot, &base_dir)?;
@@ -151,12 +153,13 @@ fn assemble(
         _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
     };
     Ok(LoadedScenario {
-        start_plan: start_plan.as_ref().map(|(name, _)| base_dir.join(name)),
+        other_files: start_plan.iter().chain(&masks).map(|(name, _)| base_dir.join(name)).collect(),
         inputs: robot
             .input
             .iter()
             .cloned()
             .chain(start_plan)
+            .chain(masks)
             .chain(guess.as_ref().map(|(_, input)| input.clone()))
             .collect(),
         guess: guess.map(|(motion, _)| motion),

@@ -18,6 +18,7 @@ mod guess;
 mod keep_out;
 mod load;
 mod map;
+mod mask;
 mod motion;
 mod sagittal;
 mod section;

@@ -54,7 +54,8 @@ pub(super) fn check(document: &Document, gait: &GaitSpec, horizon: f64) -> Resul
     for key in ["kind", "cycle", "duty", "phases"] {
         if document.has(&format!("gait.{key}")) {
             let what = format!(
-                "given together with gait.sequence, whose sections have their own {key}; remove one of them"
+                "given together with {}, whose sections have their own {key}; remove one of them",
+                document.place("gait.sequence")
             );
             return Err(document.error(&format!("gait.{key}"), what));
         }
@@ -67,7 +68,10 @@ pub(super) fn check(document: &Document, gait: &GaitSpec, horizon: f64) -> Resul
         let given =
             [("cycle", section.cycle), ("duty", section.duty)].into_iter().find(|(_, given)| given.is_some());
         if let Some((key, _)) = given.filter(|_| !section.kind.is_cyclic()) {
-            let what = "given for kind = \"stand\", which has no steps; remove it";
+            let what = format!(
+                "given for \"stand\" ({}), which has no steps; remove one of them",
+                document.place(&format!("gait.sequence[{n}].kind"))
+            );
             return Err(document.error(&format!("gait.sequence[{n}].{key}"), what));
         }
     }
@@ -75,14 +79,16 @@ pub(super) fn check(document: &Document, gait: &GaitSpec, horizon: f64) -> Resul
     let others = sections.iter().filter(|section| section.duration.is_none()).count();
     if others == 0 && (given - horizon).abs() > TOLERANCE {
         let what = format!(
-            "the durations sum to {given} s, but the horizon is {horizon} s; leave out one of them, or set the horizon to the sum"
+            "the durations sum to {given} s, but the horizon is {horizon} s ({}); leave out one of them, or set the horizon to the sum",
+            document.place("horizon")
         );
         return Err(document.error("gait.sequence", what));
     }
     if others > 0 && horizon - given < LEAST_LEFT * others as f64 {
         let what = format!(
-            "the durations sum to {given} s, which leaves {:.3} s of the horizon of {horizon} s for {others} without a duration; lengthen the horizon",
-            horizon - given
+            "the durations sum to {given} s, which leaves {:.3} s of the horizon of {horizon} s ({}) for {others} without a duration; lengthen the horizon",
+            horizon - given,
+            document.place("horizon")
         );
         return Err(document.error("gait.sequence", what));
     }

@@ -45,9 +45,18 @@ pub struct StartState {
     /// rad/s².
     #[schemars(inner(range(min = -2000.0, max = 2000.0)))]
     pub angular_acceleration: [f64; 3],
-    /// Where each foot stands, in the robot's order, m.
+    /// Where each foot is, in the robot's order, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feet: Option<Vec<[f64; 3]>>,
+    /// By foot, for how long it has been in the air and when it lands, s; 0 and 0 for one that stands. Default: all stand, unless `gait.phases`
+    /// begin with a swing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = 0.0, max = 20.0))))]
+    pub swings: Option<Vec<[f64; 2]>>,
+    /// Velocity of each foot, m/s, which counts for those in the air; default: free.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -50.0, max = 50.0))))]
+    pub feet_velocity: Option<Vec<[f64; 3]>>,
     /// The force of the ground on each foot, in the robot's order, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forces: Option<Vec<[f64; 3]>>,
@@ -57,6 +66,12 @@ pub struct StartState {
 const AT_REST: f64 = 1e-6;
 
 impl StartSpec {
+    /// For how long a foot has been in the air and when it lands, s, if the state has it in the air.
+    pub fn swing(&self, foot: usize) -> Option<[f64; 2]> {
+        let swings = self.state.as_ref()?.swings.as_ref()?;
+        swings.get(foot).copied().filter(|[since, left]| *since > 0.0 && *left > 0.0)
+    }
+
     /// Whether the robot moves at the start.
     pub fn moves(&self) -> bool {
         self.state.as_ref().is_some_and(|state| {

@@ -131,8 +131,11 @@ pub(super) fn check_speed(document: &Document, scenario: &Scenario, robot: &Robo
 pub(super) fn horizon(scenario: &Scenario, robot: &Robot) -> Option<f64> {
     let speed = scenario.goal.speed?;
     let from_middle = robot.feet.iter().map(|foot| foot.nominal[0].hypot(foot.nominal[1]));
-    let turn = if scenario.stops().is_empty() { scenario.turn().unwrap_or(0.0) } else { 0.0 };
-    let length = scenario.way_length() + turn.abs() * from_middle.fold(0.0, f64::max);
+    let way = scenario.way_length();
+    // A cycle that turns on its way is as long as one that does not.
+    let turns = scenario.stops().is_empty() && !(scenario.gait.periodic && way > 0.0);
+    let turn = if turns { scenario.turn().unwrap_or(0.0) } else { 0.0 };
+    let length = way + turn.abs() * from_middle.fold(0.0, f64::max);
     let step = scenario.time_step;
     let steps = if scenario.gait.periodic {
         (length / speed / step).round()

@@ -1,7 +1,7 @@
 //! Where the way bends around ground that cannot be walked.
 //!
-//! A foot can stand on some cells of a raster and not on others (keep-out polygons, slopes beyond `contact.max_slope`, gaps, ground without
-//! data). The robot gets over a place if a foot can stand close to it. Where the straight line between two stops leads over a place that it
+//! A foot can stand on some cells of a raster and not on others (what is kept free, slopes beyond `contact.max_slope` or, without it, beyond the
+//! friction, unless feet adhere, gaps, ground without data). With `goal.detours = false` nothing is searched. The robot gets over a place if a foot can stand close to it. Where the straight line between two stops leads over a place that it
 //! does not get over, a shortest path is searched instead, on a grid with edges between neighbors. An edge costs its length, and more where
 //! feet can stand on only a part of the surroundings, so that the path keeps away from what it goes around. The path is then pulled straight.
 
@@ -54,19 +54,36 @@ pub(super) fn bends(
         .chain(stops.iter().map(|stop| stop.position))
         .chain([scenario.goal.position])
         .collect();
-    let max_slope = scenario.contact.max_slope;
-    if robot.is_sagittal() || contact.is_none() && keep_out.is_none() && max_slope.is_none() {
-        return vec![Vec::new(); places.len() - 1];
+    let straight = vec![Vec::new(); places.len() - 1];
+    let max_slope = steepest(scenario);
+    let everywhere = contact.is_none() && keep_out.is_none() && is_below(ground, max_slope);
+    if !scenario.goal.detours || robot.is_sagittal() || everywhere {
+        return straight;
     }
     let stands = |place: [f64; 2]| {
         let [x, y] = ground.gradient(place[0], place[1]);
-        contact.map_or_else(|| max_slope.is_none_or(|most| x.hypot(y) <= most), |c| c.is_steppable(place))
+        contact.map_or_else(|| x.hypot(y) <= max_slope, |c| c.is_steppable(place))
             && keep_out.is_none_or(|keep_out| keep_out.allows(place))
     };
-    let Ok(search) = Search::new(robot, ground.extent(), stands) else {
-        return vec![Vec::new(); places.len() - 1];
-    };
+    let Ok(search) = Search::new(robot, ground.extent(), stands) else { return straight };
     places.windows(2).map(|ends| search.around([ends[0], ends[1]])).collect()
+}
+
+/// The steepest ground that counts as walkable.
+fn steepest(scenario: &Scenario) -> f64 {
+    let contact = &scenario.contact;
+    let by_friction = if scenario.robot.adhesive_feet.is_empty() { contact.friction } else { f64::INFINITY };
+    contact.max_slope.unwrap_or(by_friction)
+}
+
+/// Whether ground is nowhere steeper than a slope, at its samples.
+fn is_below(ground: &Heightfield, slope: f64) -> bool {
+    let grid = ground.grid();
+    slope.is_infinite()
+        || (0..grid.len()).all(|n| {
+            let [x, y] = ground.gradient(grid.x(n % grid.columns), grid.y(n / grid.columns));
+            x.hypot(y) <= slope
+        })
 }
 
 impl Search {
@@ -232,5 +249,25 @@ mod tests {
         // A wall from border to border has no way around.
         let wall = "[[keep_out]]\npolygon = [[-0.4, -3.0], [0.4, -3.0], [0.4, 3.0], [-0.4, 3.0]]\n";
         assert_eq!(bends_of(wall), [Vec::<[f64; 2]>::new(), vec![]]);
+    }
+
+    #[test]
+    fn the_way_bends_around_ground_that_is_steeper_than_the_friction() {
+        let bends_of = |height: f64, more: &str| {
+            let text = format!(
+                "[terrain]\nkind = \"flat\"\nextent = [-3.0, 3.0, -3.0, 3.0]\n[start]\nposition = [-1.8, 0.0]\n[goal]\nposition = [1.8, 0.0]\n{more}"
+            );
+            let scenario: Scenario = toml::from_str(&text).expect("a scenario");
+            let robot = Robot::load(&RobotSpec::default(), ".".as_ref()).expect("a robot");
+            // A hill with steep flanks, 1.2 m wide.
+            let hill = |x: f64, y: f64| Ok(height / (1.0 + ((x * x + y * y) / 0.36).powi(4)));
+            let ground = Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.05, hill).expect("a ground");
+            bends(&scenario, &robot, &ground, None, None)
+        };
+        assert!(bends_of(0.1, "") == [Vec::<[f64; 2]>::new()]);
+        let around = bends_of(1.5, "");
+        assert!(around[0].iter().any(|[_, y]| y.abs() > 0.6), "{around:?}");
+        assert_eq!(bends_of(1.5, "detours = false\n"), [Vec::<[f64; 2]>::new()]);
+        assert_eq!(bends_of(1.5, "[robot]\nadhesive_feet = [\"LF\"]\n"), [Vec::<[f64; 2]>::new()]);
     }
 }

@@ -59,7 +59,7 @@ impl Gait {
         let gait = &scenario.gait;
         let feet = robot.feet.len();
         let mut swings = match gait.kind {
-            GaitKind::Custom => custom(gait.phases.as_deref(), feet, step, intervals)?,
+            GaitKind::Custom => custom(scenario, feet, step, intervals)?,
             _ if gait.periodic => periodic(scenario, robot, fraction)?,
             _ => sequence(scenario, robot, fraction)?,
         };
@@ -73,13 +73,20 @@ impl Gait {
         Ok(Self { intervals, swings })
     }
 
-    /// The stances of a foot in order of time, one more than its swings.
+    /// The stances of a foot in order of time, one more than its swings. Beside a swing over the start or the end, that beyond it has no
+    /// duration.
     pub fn stances(&self, foot: usize) -> Vec<Stance> {
         let swings = &self.swings[foot];
         (0..=swings.len())
             .map(|j| Stance {
-                start: if j == 0 { 0.0 } else { swings[j - 1].end },
-                end: if j == swings.len() { self.intervals as f64 } else { swings[j].start },
+                start: j.checked_sub(1).map_or_else(
+                    || swings.first().map_or(0.0, |s| s.start.min(0.0)),
+                    |before| swings[before].end,
+                ),
+                end: swings.get(j).map_or_else(
+                    || swings.last().map_or(0.0, |s| s.end).max(self.intervals as f64),
+                    |after| after.start,
+                ),
             })
             .collect()
     }
@@ -112,16 +119,7 @@ fn periodic(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
     let (step, cadence) = (scenario.time_step, Cadence { cycle, ..cadence });
     let lift_offs = lift_offs(section.kind, robot).map_err(keyed)?;
     let intervals = (scenario.horizon / step).round() as usize;
-    let swings = cyclic::swings(&cadence, &lift_offs, intervals, step).map_err(keyed)?;
-    let outside = |s: &Swing| s.start <= 0.0 || s.end >= intervals as f64;
-    if swings.iter().flatten().any(outside) {
-        let what = format!(
-            "given \"{}\", in which not all feet ever stand for two time steps, but a cyclic motion (gait.periodic) begins so; raise the duty",
-            section.kind
-        );
-        return Err(Error::key("gait.kind", what));
-    }
-    Ok(swings)
+    cyclic::swings(&cadence, &lift_offs, intervals, step).map_err(keyed)
 }
 
 /// The swings of each foot, section by section.
@@ -129,7 +127,10 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
     let gait = &scenario.gait;
     let sections = gait.sections();
     let ends = gait.section_ends(scenario.horizon);
-    let mut swings = vec![Vec::new(); robot.feet.len()];
+    // Feet in the air at the start land first.
+    let mut swings: Vec<Vec<Swing>> =
+        (0..robot.feet.len()).map(|foot| begun(scenario, foot).into_iter().collect()).collect();
+    let landed = swings.iter().flatten().map(|s| s.end * scenario.time_step + CHANGE).fold(0.0, f64::max);
     for (n, section) in sections.iter().enumerate().filter(|(_, section)| section.kind.is_cyclic()) {
         let keyed = |e: Error| match e {
             Error::Key { key, what } if key != "horizon" => Error::key(section_key(gait, n, &key), what),
@@ -149,7 +150,7 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
             Some(_) if alone(neighbor) => 0.0,
             _ => CHANGE,
         };
-        let window = Window {
+        let mut window = Window {
             from: if n == 0 { 0.0 } else { ends[n - 1] },
             to: ends[n],
             stand: [
@@ -158,6 +159,9 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
             ]
             .map(stand),
         };
+        if n == 0 {
+            window.stand[0] = window.stand[0].max(landed);
+        }
         let lift_offs = lift_offs(section.kind, robot).map_err(keyed)?;
         let more = cadence.swings(&lift_offs, &window, scenario.time_step).map_err(keyed)?;
         for (swings, more) in swings.iter_mut().zip(more) {
@@ -175,8 +179,17 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
     Ok(swings)
 }
 
-/// Phase tables: alternating stance and swing durations per foot, stance first and last; they fill the horizon.
-fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize) -> Result<Vec<Vec<Swing>>> {
+/// The swing that a foot is in at the start, if the state there has it in the air.
+fn begun(scenario: &Scenario, foot: usize) -> Option<Swing> {
+    // Rounding must not move a touch-down off the samples of plans, which are ten in a time step.
+    let [since, left] = scenario.start.swing(foot)?.map(|time| 10.0 * time / scenario.time_step);
+    Some(Swing::given(-0.1 * since, switches::snapped(left) / 10.0))
+}
+
+/// Phase tables: alternating stance and swing durations per foot, stance first and last; they fill the horizon. A first or last stance
+/// without duration is none: that swing goes as far beyond the end as it is within, unless the state at the start says otherwise.
+fn custom(scenario: &Scenario, feet: usize, step: f64, intervals: usize) -> Result<Vec<Vec<Swing>>> {
+    let phases = scenario.gait.phases.as_deref();
     let Some(phases) = phases.filter(|phases| phases.len() == feet) else {
         // Loading a scenario refuses this with file and line.
         return Err(Error::key("gait.phases", "kind = \"custom\" needs a row for each foot"));
@@ -197,14 +210,24 @@ fn custom(phases: Option<&[Vec<f64>]>, feet: usize, step: f64, intervals: usize)
             edges.push((time / step).round());
         }
         edges[durations.len()] = intervals as f64;
+        let in_air = scenario.in_air(foot);
         for (j, pair) in edges.windows(2).enumerate() {
-            if pair[1] < pair[0] + SHORTEST_PHASE {
+            let none = (j == 0 && in_air[0]) || (j + 1 == durations.len() && in_air[1]);
+            if pair[1] < pair[0] + SHORTEST_PHASE && !none {
                 let what =
                     format!("given {} s, which is shorter than two time steps of {step} s", durations[j]);
                 return Err(Error::key(format!("{key}[{j}]"), what));
             }
         }
-        Ok((1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect())
+        let mut swings: Vec<Swing> =
+            (1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect();
+        if let Some(first) = swings.first_mut().filter(|_| in_air[0]) {
+            *first = begun(scenario, foot).unwrap_or(Swing::given(-first.end, first.end));
+        }
+        if let Some(last) = swings.last_mut().filter(|_| in_air[1]) {
+            last.end += intervals as f64 - last.start;
+        }
+        Ok(swings)
     };
     phases.iter().enumerate().map(row).collect()
 }

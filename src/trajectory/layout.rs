@@ -172,7 +172,7 @@ impl Layout {
 
     /// The forces at some samples of a stance.
     fn add_forces(&mut self, stance: Stance, samples: Range<usize>, spacing: usize) -> Vec<LinearNode> {
-        if spacing == 1 {
+        if spacing == 1 || samples.is_empty() {
             return samples.map(|_| LinearNode::variable(self.allocate(3))).collect();
         }
         self.add_coarse_forces(stance, samples, spacing)

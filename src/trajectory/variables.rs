@@ -64,6 +64,11 @@ pub struct FootVariables {
 }
 
 impl FootVariables {
+    /// Whether its first swing has begun before the start.
+    pub fn starts_in_air(&self) -> bool {
+        self.swings.first().is_some_and(|swing| swing.swing.start < 0.0)
+    }
+
     /// Moves all its variables by so many places.
     pub(super) fn move_variables(&mut self, by: usize) {
         for stance in &mut self.stances {

@@ -103,6 +103,7 @@ pub fn standing() -> Plan {
         legs: None,
         warped: None,
         phase_durations: vec![vec![1.0]; 4],
+        swing_beyond: vec![[0.0; 2]; 4],
         splines: Vec::new(),
         ground: GroundGrid {
             rows,

@@ -14,6 +14,7 @@ from warpgait.motions import motion_of_plan
 from warpgait.plan import read_plan
 
 CYCLE = """
+horizon = 0.8
 [robot]
 name = "anymal_c"
 [terrain]
@@ -24,7 +25,6 @@ position = [0.0, 0.0]
 [goal]
 position = [0.3, 0.0]
 yaw = 0.1
-speed = 0.375
 [gait]
 kind = "trot"
 cycle = 0.8

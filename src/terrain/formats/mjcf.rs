@@ -11,6 +11,7 @@ use super::input::Input;
 use super::{hfield, image};
 use crate::digest::sha256_hex;
 use crate::error::{Error, Result};
+use crate::files::png;
 use crate::terrain::file::read_file;
 use crate::terrain::raster::{Raster, Values, check_size};
 
@@ -129,11 +130,8 @@ fn values(document: &Document, field: Node, input: &Input) -> Result<Raster> {
         let path = path(document, file, input.path);
         let bytes = read_file(&path)?;
         let named = Input { bytes: &bytes, path: &path, member: None, spacing: None };
-        let mut raster = if bytes.starts_with(image::SIGNATURE) {
-            image::decode(&named)?
-        } else {
-            hfield::values(&bytes)?
-        };
+        let mut raster =
+            if bytes.starts_with(png::SIGNATURE) { image::decode(&named)? } else { hfield::values(&bytes)? };
         raster.inputs.push((path.to_string_lossy().into_owned(), sha256_hex(&bytes)));
         return Ok(raster);
     }

@@ -17,6 +17,7 @@ pub use input::Input;
 
 use super::raster::Raster;
 use crate::error::{Error, Result};
+use crate::files::png;
 
 /// A file format of heightmaps.
 pub struct Format {
@@ -37,7 +38,7 @@ const FORMATS: [Format; 11] = [
     Format {
         name: "a PNG image",
         extensions: ".png",
-        recognizes: |input| input.bytes.starts_with(image::SIGNATURE),
+        recognizes: |input| input.bytes.starts_with(png::SIGNATURE),
         decode: image::decode,
         has_members: false,
     },

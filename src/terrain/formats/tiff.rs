@@ -6,9 +6,9 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::image::Pixels;
 use super::input::Input;
 use crate::error::{Error, Result};
+use crate::files::png::Pixels;
 use crate::scenario::terrain::Layout;
 use crate::terrain::raster::{Raster, Values, check_size};
 
