@@ -195,3 +195,20 @@ fn a_mask_keeps_feet_off_and_the_plan_has_its_outlines() {
         assert!(message.starts_with("s.toml:13: keep_out[0].mask: ") && message.contains(words), "{message}");
     }
 }
+
+#[test]
+fn more_time_is_a_remedy_for_haste_and_was_tried() {
+    let text = |horizon: &str| {
+        format!(
+            "formulation = \"direct\"\nhorizon = {horizon}\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n\
+             [start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.8, 0.0]\n[gait]\nkind = \"trot\"\n[contact]\nfriction_margin = 0.0\n\
+             [solver]\nmax_iterations = 60\n"
+        )
+    };
+    let (motion, plan) = solved(&text("2.0"));
+    assert!(!motion.solved);
+    let why = plan.meta.explanation.as_ref().expect("an explanation");
+    let [key, to, from] = why.remedy.as_ref().expect("a remedy");
+    assert_eq!((key.as_str(), from.as_str()), ("horizon", "2"));
+    assert!(solved(&text(to)).0.solved, "{to}");
+}

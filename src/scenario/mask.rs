@@ -175,9 +175,8 @@ impl Mask {
             let (mut at, mut direction) = (start, directions[0]);
             let mut corners = Vec::new();
             let mut before = None;
-            loop {
+            while let Some(here) = edges.get_mut(&at) {
                 // Where two parts touch, turn right, and so stay with the same part.
-                let Some(here) = edges.get_mut(&at) else { break };
                 let turns = [1, 0, 3].map(|turn| (before.unwrap_or(direction) + turn) % 4);
                 let next = turns.into_iter().find(|turn| here.contains(turn));
                 let Some(next) = next.or(here.first().copied()) else { break };

@@ -100,6 +100,20 @@ fn guess() {
 }
 
 #[test]
+fn mask() {
+    let seeds = seeds::heights();
+    fuzz(
+        "mask",
+        |random| mutate::bytes(random, &seeds),
+        |folder, input| {
+            file(folder, "mask", input);
+            let _ =
+                scenario::load_text("s.toml", seeds::FLAT, folder, &["keep_out=[{mask=\"mask\"}]".into()]);
+        },
+    );
+}
+
+#[test]
 fn limits() {
     fuzz(
         "limits",

@@ -231,7 +231,12 @@ class StartState(TypedDict, total=False):
     angular_acceleration: Numbers
     """rad/s²."""
     feet: Sequence[Numbers]
-    """Where each foot stands, in the robot's order, m."""
+    """Where each foot is, in the robot's order, m."""
+    swings: Sequence[Numbers]
+    """By foot, for how long it has been in the air and when it lands, s; 0 and 0 for one that stands. Default: all stand, unless
+    `gait.phases` begin with a swing."""
+    feet_velocity: Sequence[Numbers]
+    """Velocity of each foot, m/s, which counts for those in the air; default: free."""
     forces: Sequence[Numbers]
     """The force of the ground on each foot, in the robot's order, N."""
 
@@ -253,6 +258,8 @@ class GoalSpec(TypedDict, total=False):
     """Mean speed along the way, m/s, from which the horizon follows where that is not given."""
     circle: CircleSpec
     """The way is an arc."""
+    detours: bool
+    """Whether the way may lead around what cannot be walked, where that blocks the straight one."""
     waypoints: Sequence[WaypointSpec]
     """Where the way leads, in order."""
     waypoint_distance: float
@@ -302,7 +309,8 @@ class GaitSpec(TypedDict, total=False):
     sequence: Sequence[SectionSpec]
     """Gaits one after the other, instead of `kind`, `cycle` and `duty`."""
     phases: Sequence[Numbers]
-    """custom: for each foot, alternating stance and swing durations in s, stance first; they sum to the horizon."""
+    """custom: for each foot, alternating stance and swing durations in s, stance first; they sum to the horizon. A first or last stance
+    of 0 s is none: the foot begins or ends in the air."""
 
 
 class SectionSpec(TypedDict, total=False):
@@ -361,6 +369,13 @@ class KeepOutSpec(TypedDict, total=False):
 
     polygon: Sequence[Numbers]
     """Its corners in order around it, x and y, m; it need not be convex."""
+    mask: str
+    """Instead of a polygon, a raster of what is kept free, relative to the scenario: an image (PNG), whose pixels from half of white on
+    count, or an array (`.npy`) of numbers or booleans, whose elements other than zero do. The first row has the largest y."""
+    extent: Numbers
+    """mask: the ground that it covers, from edge to edge: x_min, x_max, y_min, y_max, m; default: the terrain's extent."""
+    outlines: Sequence[Sequence[Numbers]]
+    """What a mask becomes: loops around its parts, and around holes in them, x and y, m."""
 
 
 class FootholdSpec(TypedDict, total=False):
