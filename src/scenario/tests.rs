@@ -275,7 +275,7 @@ fn mistakes_are_refused_with_line_key_given_and_allowed() {
         ),
         (
             with("kind = \"trot\"", "sequence = [{ kind = \"walk\" }, { kind = \"stand\", cycle = 1.0 }]"),
-            vec!["gait.sequence[1].cycle: given for kind = \"stand\""],
+            vec!["gait.sequence[1].cycle: given for \"stand\" (gait.sequence[1].kind, line 10)"],
         ),
         (
             with("kind = \"trot\"", "kind = \"custom\"\nphases = [[10.0], [4.0, 0.3]]"),

@@ -30,7 +30,7 @@ pub(super) fn swings(
 }
 
 /// The middle of the longest time at which the most feet stand, as a fraction of the cycle, if each lifts off at its fraction and swings for
-/// another.
+/// another; of several the last, after which the first foot lifts off.
 fn seam(lift_offs: &[f64], swing: f64) -> f64 {
     let mut events: Vec<f64> =
         lift_offs.iter().flat_map(|l| [*l, l + swing]).map(|e| e.rem_euclid(1.0)).collect();
@@ -38,10 +38,9 @@ fn seam(lift_offs: &[f64], swing: f64) -> f64 {
     let next = events.iter().skip(1).copied().chain(events.first().map(|e| e + 1.0));
     let spans = events.iter().zip(next).map(|(from, to)| (to - from, 0.5 * (from + to)));
     let standing = |at: f64| lift_offs.iter().filter(|l| (at - **l).rem_euclid(1.0) >= swing).count();
-    // What is shorter than rounding is no time at all.
-    let best = spans
-        .filter(|(length, _)| *length > 1e-9)
-        .max_by(|a, b| standing(a.1).cmp(&standing(b.1)).then(a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1))));
+    // Without rounding; what is shorter is no time at all.
+    let rank = |(length, middle): &(f64, f64)| (standing(*middle), (1e9 * length).round() as u64);
+    let best = spans.filter(|span| rank(span).1 > 0).max_by_key(rank);
     best.map_or(0.0, |(_, middle)| middle.rem_euclid(1.0))
 }
 
