@@ -17,6 +17,7 @@ mod ends;
 mod exact;
 mod gaits;
 mod guess;
+mod leg_mass;
 mod measured_ground;
 mod motions;
 mod outputs;

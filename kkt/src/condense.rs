@@ -62,7 +62,7 @@ pub struct Condenser {
     coefficients: Vec<f64>,
     pivots: Vec<Pivot>,
     weights: Vec<f64>,
-    /// A column of a group's sum.
+    /// A number for each of a group's variables.
     sums: Vec<f64>,
 }
 
@@ -95,11 +95,10 @@ fn inequalities(matrix: &Symmetric, layout: Layout) -> Option<Inequalities> {
     let first_multiplier = n + m + equations;
     let mut rows = vec![Vec::new(); m];
     let mut pivots = vec![[NONE; 3]; m];
-    for column in 0..matrix.dimension() {
-        let is_slack = (n..n + m).contains(&column);
-        for (place, row) in matrix.column(column) {
-            let (row, place) = (row as usize, place as u32);
-            if is_slack {
+    for row in 0..matrix.dimension() {
+        for (place, column) in matrix.row(row) {
+            let (column, place) = (column as usize, place as u32);
+            if (n..n + m).contains(&column) {
                 // A slack meets itself and its own multiplier only.
                 let k = column - n;
                 match row {
@@ -208,6 +207,15 @@ impl Condenser {
                 memberships[column as usize].push((g as u32, t as u32));
             }
         }
+        // The entries that are copied, by columns.
+        let mut below: Vec<Vec<(u32, u32)>> = vec![Vec::new(); reduced];
+        for (row, &old) in self.kept.iter().enumerate() {
+            for (source, column) in matrix.row(old as usize) {
+                if let Some(below) = below.get_mut(reduced_of[column as usize] as usize) {
+                    below.push((source as u32, row as u32));
+                }
+            }
+        }
         let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
         let mut place_of = vec![0; reduced];
         let mut seen = vec![NONE; reduced];
@@ -220,11 +228,7 @@ impl Condenser {
                 }
             };
             take(column as u32);
-            for (_, row) in matrix.column(self.kept[column] as usize) {
-                if reduced_of[row as usize] != NONE {
-                    take(reduced_of[row as usize]);
-                }
-            }
+            below[column].iter().for_each(|&(_, row)| take(row));
             for &(g, t) in &memberships[column] {
                 let group = &self.groups[g as usize];
                 self.columns[group.columns..][..group.width][t as usize..].iter().for_each(|&row| take(row));
@@ -233,11 +237,7 @@ impl Condenser {
             for (place, &row) in pattern.rows.iter().enumerate().skip(from) {
                 place_of[row as usize] = place as u32;
             }
-            for (source, row) in matrix.column(self.kept[column] as usize) {
-                if reduced_of[row as usize] != NONE {
-                    self.copies.push((source as u32, place_of[reduced_of[row as usize] as usize]));
-                }
-            }
+            self.copies.extend(below[column].iter().map(|&(source, row)| (source, place_of[row as usize])));
             for &(g, t) in &memberships[column] {
                 let (group, t) = (&self.groups[g as usize], t as usize);
                 let rows = &self.columns[group.columns..][..group.width][t..];
@@ -259,7 +259,7 @@ impl Condenser {
         for (_, place) in &mut self.copies {
             *place = new_place[*place as usize];
         }
-        self.copies.sort_unstable();
+        self.copies.sort_unstable_by_key(|&(_, place)| place);
     }
 
     /// How many inequalities are condensed.
@@ -336,43 +336,133 @@ impl Condenser {
     }
 
     /// The right-hand side of the reduced system.
-    pub fn restrict(&self, full: &[f64], reduced: &mut [f64]) {
+    pub fn restrict(&mut self, full: &[f64], reduced: &mut [f64]) {
         for (value, &old) in reduced.iter_mut().zip(&self.kept) {
             *value = full[old as usize];
         }
-        self.for_each_row(|pivot, [slack, multiplier], columns, row| {
-            let y = (pivot.sigma * full[multiplier] - pivot.a * full[slack]) / pivot.determinant();
-            for (&column, coefficient) in columns.iter().zip(row) {
-                reduced[column as usize] -= coefficient * y;
-            }
-        });
+        pulp::Arch::new().dispatch(Restrict { condenser: self, full, reduced });
     }
 
     /// The solution of the full system, of which `full` is still the right-hand side, from that of the reduced one.
-    pub fn expand(&self, reduced: &[f64], full: &mut [f64]) {
-        self.for_each_row(|pivot, [slack, multiplier], columns, row| {
-            let products = columns.iter().zip(row).map(|(&column, value)| value * reduced[column as usize]);
-            let (b_s, b_y) = (full[slack], full[multiplier] - products.sum::<f64>());
-            let determinant = pivot.determinant();
-            full[slack] = (pivot.d * b_s - pivot.a * b_y) / determinant;
-            full[multiplier] = (pivot.sigma * b_y - pivot.a * b_s) / determinant;
-        });
+    pub fn expand(&mut self, reduced: &[f64], full: &mut [f64]) {
+        pulp::Arch::new().dispatch(Expand { condenser: self, reduced, full });
         for (&value, &old) in reduced.iter().zip(&self.kept) {
             full[old as usize] = value;
         }
     }
 
-    /// Calls with each inequality's pivot, its rows s and y in the full matrix, its columns and coefficients.
-    fn for_each_row(&self, mut visit: impl FnMut(&Pivot, [usize; 2], &[u32], &[f64])) {
+    /// Calls with each group: its columns, numbers for them, and of its inequalities the coefficients, the pivots, and the rows s and y in the
+    /// full matrix.
+    #[inline(always)]
+    fn for_each_group(&mut self, mut visit: impl FnMut(&[u32], &mut [f64], Rows<'_>)) {
         let Layout { variables, inequalities, equations } = self.layout;
         for group in &self.groups {
-            let columns = &self.columns[group.columns..][..group.width];
-            for t in 0..group.count {
-                let position = group.first + t;
-                let slack = variables + self.order[position] as usize;
-                let row = &self.coefficients[group.coefficients + t * group.width..][..group.width];
-                visit(&self.pivots[position], [slack, slack + inequalities + equations], columns, row);
-            }
+            let range = group.first..group.first + group.count;
+            let rows = Rows {
+                coefficients: &self.coefficients[group.coefficients..][..group.count * group.width],
+                pivots: &self.pivots[range.clone()],
+                order: &self.order[range],
+                slacks: variables,
+                multipliers: variables + inequalities + equations,
+            };
+            visit(&self.columns[group.columns..][..group.width], &mut self.sums[..group.width], rows);
         }
     }
+}
+
+/// The inequalities of a group.
+struct Rows<'a> {
+    coefficients: &'a [f64],
+    pivots: &'a [Pivot],
+    order: &'a [u32],
+    /// Where the rows s and y_d begin.
+    slacks: usize,
+    multipliers: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// The pivot, the rows s and y in the full matrix, and the coefficients of each.
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = (&'a Pivot, [usize; 2], &'a [f64])> {
+        let width = (self.coefficients.len() / self.order.len()).max(1);
+        // An inequality without variables has no coefficients.
+        let none: &[f64] = &[];
+        let rows = self.coefficients.chunks_exact(width).chain(std::iter::repeat(none));
+        let (slacks, multipliers) = (self.slacks, self.multipliers);
+        self.pivots
+            .iter()
+            .zip(self.order)
+            .zip(rows)
+            .map(move |((pivot, &k), row)| (pivot, [slacks + k as usize, multipliers + k as usize], row))
+    }
+}
+
+/// [`Condenser::restrict`] as pulp calls it: a group's sum is dense.
+struct Restrict<'a> {
+    condenser: &'a mut Condenser,
+    full: &'a [f64],
+    reduced: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Restrict<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { condenser, full, reduced } = self;
+        condenser.for_each_group(|columns, sums, rows| {
+            sums.fill(0.0);
+            for (pivot, [slack, multiplier], row) in rows.iter() {
+                let y = (pivot.sigma * full[multiplier] - pivot.a * full[slack]) / pivot.determinant();
+                for (sum, coefficient) in sums.iter_mut().zip(row) {
+                    *sum += coefficient * y;
+                }
+            }
+            for (&column, sum) in columns.iter().zip(sums) {
+                reduced[column as usize] -= *sum;
+            }
+        });
+    }
+}
+
+/// [`Condenser::expand`] as pulp calls it.
+struct Expand<'a> {
+    condenser: &'a mut Condenser,
+    reduced: &'a [f64],
+    full: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Expand<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { condenser, reduced, full } = self;
+        condenser.for_each_group(|columns, values, rows| {
+            for (value, &column) in values.iter_mut().zip(columns) {
+                *value = reduced[column as usize];
+            }
+            for (pivot, [slack, multiplier], row) in rows.iter() {
+                let (b_s, b_y) = (full[slack], full[multiplier] - dot(row, values));
+                let determinant = pivot.determinant();
+                full[slack] = (pivot.d * b_s - pivot.a * b_y) / determinant;
+                full[multiplier] = (pivot.sigma * b_y - pivot.a * b_s) / determinant;
+            }
+        });
+    }
+}
+
+/// a · b, in as many sums as the widest vector has numbers.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b[..a.len()].as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
 }

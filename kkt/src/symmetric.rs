@@ -1,11 +1,12 @@
 //! Sparse symmetric matrices by their lower triangle.
 
-/// The lower triangle by columns, rows ascending, every entry once.
+/// The lower triangle by rows, columns ascending, every entry once. A row of a multiplier is one of Ipopt's Jacobian, whose entries come row by
+/// row, so values go to places that follow each other.
 #[derive(Debug)]
 pub struct Symmetric {
-    /// n + 1 places in `rows` and `values`.
+    /// n + 1 places in `columns` and `values`.
     pub starts: Vec<usize>,
-    pub rows: Vec<u32>,
+    pub columns: Vec<u32>,
     pub values: Vec<f64>,
     /// Where each given entry is added.
     slots: Vec<u32>,
@@ -14,33 +15,33 @@ pub struct Symmetric {
 impl Symmetric {
     /// The pattern of the given entries (row, column), of either triangle, each below n; values are zero.
     pub fn new(n: usize, entries: &[(u32, u32)]) -> Self {
-        // Two stable bucket sorts: by row, then by column.
+        // Two stable bucket sorts: by column, then by row.
         let lower = |k: u32| {
             let (row, column) = entries[k as usize];
             (row.max(column), row.min(column))
         };
         let all: Vec<u32> = (0..entries.len() as u32).collect();
-        let by_row = bucket_sort(n, &all, |k| lower(k).0);
-        let order = bucket_sort(n, &by_row, |k| lower(k).1);
+        let by_column = bucket_sort(n, &all, |k| lower(k).1);
+        let order = bucket_sort(n, &by_column, |k| lower(k).0);
 
         let mut starts = vec![0; n + 1];
-        let mut rows = Vec::with_capacity(entries.len());
+        let mut columns = Vec::with_capacity(entries.len());
         let mut slots = vec![0; entries.len()];
         let mut last = None;
         for &k in &order {
             let (row, column) = lower(k);
             if last != Some((row, column)) {
                 last = Some((row, column));
-                rows.push(row);
-                starts[column as usize + 1] = rows.len();
+                columns.push(column);
+                starts[row as usize + 1] = columns.len();
             }
-            slots[k as usize] = rows.len() as u32 - 1;
+            slots[k as usize] = columns.len() as u32 - 1;
         }
-        for column in 0..n {
-            starts[column + 1] = starts[column + 1].max(starts[column]);
+        for row in 0..n {
+            starts[row + 1] = starts[row + 1].max(starts[row]);
         }
-        let values = vec![0.0; rows.len()];
-        Self { starts, rows, values, slots }
+        let values = vec![0.0; columns.len()];
+        Self { starts, columns, values, slots }
     }
 
     pub fn dimension(&self) -> usize {
@@ -55,28 +56,28 @@ impl Symmetric {
         }
     }
 
-    /// The entries of a column: place, row.
-    pub fn column(&self, column: usize) -> impl Iterator<Item = (usize, u32)> {
-        (self.starts[column]..self.starts[column + 1]).map(|place| (place, self.rows[place]))
+    /// The entries of a row: place, column.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, u32)> {
+        (self.starts[row]..self.starts[row + 1]).map(|place| (place, self.columns[place]))
     }
 
     /// b − K x.
     pub fn residual(&self, b: &[f64], x: &[f64], out: &mut [f64]) {
         out.copy_from_slice(b);
-        for column in 0..self.dimension() {
-            let (from, to) = (self.starts[column], self.starts[column + 1]);
-            let x_column = x[column];
+        for row in 0..self.dimension() {
+            let (from, mut to) = (self.starts[row], self.starts[row + 1]);
+            let x_row = x[row];
             let mut sum = 0.0;
-            for (&row, &value) in self.rows[from..to].iter().zip(&self.values[from..to]) {
-                let row = row as usize;
-                if row == column {
-                    sum += value * x_column;
-                } else {
-                    sum += value * x[row];
-                    out[row] -= value * x_column;
-                }
+            // The diagonal is the last entry.
+            if from < to && self.columns[to - 1] as usize == row {
+                to -= 1;
+                sum = self.values[to] * x_row;
             }
-            out[column] -= sum;
+            for (&column, &value) in self.columns[from..to].iter().zip(&self.values[from..to]) {
+                sum += value * x[column as usize];
+                out[column as usize] -= value * x_row;
+            }
+            out[row] -= sum;
         }
     }
 }

@@ -1,9 +1,10 @@
-//! What the legs' own mass adds to the laws, as functions of time that stay the same during a solve.
+//! What the legs' own mass adds to the laws, as functions of time that are known at every point of a solve.
 //!
 //! The base's position is the center of mass of the whole robot, so Newton's law has no such term. The trunk is where the center of mass
 //! has moved away from: its point that is the center of mass at the nominal stance lies at p − R s. So what is fixed to the trunk sees a
 //! foot at r = Rᵀ(p_i − p) + s. Euler's law gets the rate of the angular momentum that a rigid body does not have, and a joint bears the
-//! weight and the inertia of the links below it. They are computed from a motion in `crate::planner::legs`, and solved with again.
+//! weight and the inertia of the links below it. They are computed from a motion in `crate::planner::legs`, and updated from the iterates of a
+//! solve in `crate::planner::following`.
 //!
 //! Most of that momentum is due to the swinging feet, and varies with their accelerations. So Euler's law has, beside the known torque, the
 //! term A (r_k−1 − 2 r_k + r_k+1) for each of them with a constant matrix A; what is known is the rest. It hardly changes from one solve to the

@@ -109,9 +109,9 @@ impl<'a> BodyMotion<'a> {
         for n in 0..count {
             // The shift changes smoothly.
             let shift = |back: usize| n.checked_sub(back).map(|n| motion.postures[n].shift);
-            let guess = match (shift(1), shift(2)) {
-                (Some(one), Some(two)) => one * 2.0 - two,
-                (Some(one), None) => one,
+            let guess = match [shift(1), shift(2), shift(3)] {
+                [Some(one), Some(two), Some(three)] => (one - two) * 3.0 + three,
+                [Some(one), ..] => one,
                 _ => Vector3::zeros(),
             };
             motion.postures.push(motion.posture(n, &motion.rotations[n], guess));
@@ -285,20 +285,19 @@ impl<'a> BodyMotion<'a> {
     /// ```
     ///
     /// is solved for small turns θ, with ρ the residual less the function of time that is linear between samples and has the same averages,
-    /// and J the angular momentum of a turn of the base alone. None where the base's knots are not those of the samples, and where the turns are not small.
-    pub fn settled(mut self, x: &[f64]) -> Option<(Layout, Vec<f64>)> {
+    /// and J the angular momentum of a turn of the base alone. None where the base's knots are not those of the samples, and where the turns are not small; then this motion is spoiled.
+    pub fn settle(&mut self, x: &[f64]) -> Option<(Layout, Vec<f64>)> {
         let layout = &self.model.layout;
-        let inertias: Vec<Matrix3<f64>> = (0..self.postures.len()).map(|n| self.turning_inertia(n)).collect();
+        let inertias: Vec<Matrix3<f64>> =
+            (0..=layout.intervals).map(|k| self.turning_inertia(k * self.fine)).collect();
         let torques = self.torques_of_forces(x);
         let given = self.rotations.clone();
         for _ in 0..SETTLING_ROUNDS {
             let residuals = self.oscillation(&torques);
             for k in 0..layout.intervals {
                 let first = k * self.fine;
-                let turns = small_turns(
-                    &inertias[first..=first + self.fine],
-                    &residuals[first + 1..first + self.fine],
-                )?;
+                let turns =
+                    small_turns([&inertias[k], &inertias[k + 1]], &residuals[first + 1..first + self.fine])?;
                 if turns.iter().any(|turn| turn.norm() * self.step.powi(2) > LARGEST_TURN) {
                     return None;
                 }
@@ -368,10 +367,13 @@ const LARGEST_TURN: f64 = 0.05;
 /// J hardly changes with the turns.
 const SETTLING_ROUNDS: usize = 2;
 
-/// θ_n / δ² of [`BodyMotion::settled`] at the inner ends of the steps of an interval, from J at all ends and ρ at the inner ones: Gauss's
-/// elimination by blocks. None if J is singular.
-fn small_turns(inertias: &[Matrix3<f64>], residuals: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-    let between: Vec<Matrix3<f64>> = inertias.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5).collect();
+/// θ_n / δ² of [`BodyMotion::settle`] at the inner ends of the steps of an interval, from J at its own ends, linear in between, and ρ at the
+/// inner ones: Gauss's elimination by blocks. None if J is singular.
+fn small_turns(inertias: [&Matrix3<f64>; 2], residuals: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+    let steps = residuals.len() + 1;
+    let part = |n: usize| (n as f64 + 0.5) / steps as f64;
+    let between: Vec<Matrix3<f64>> =
+        (0..steps).map(|n| inertias[0] * (1.0 - part(n)) + inertias[1] * part(n)).collect();
     let mut eliminated: Vec<(Matrix3<f64>, Vector3<f64>)> = Vec::with_capacity(residuals.len());
     for (n, residual) in residuals.iter().enumerate() {
         let (left, right) = (between[n], between[n + 1]);

@@ -15,6 +15,7 @@
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | `travel` | whether the goal is within range at all |
 //! | `legs` | what the legs' own mass adds to the laws, from a motion |
+//! | `leg_update` | the same from the iterates of a solve, while it runs |
 //! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | `friction_margin` | the same, and what a smaller margin of friction would do |
@@ -34,6 +35,7 @@ mod cyclic;
 pub mod derivatives;
 mod elastic;
 mod follow;
+mod following;
 mod foothold_search;
 mod footholds;
 mod friction_margin;

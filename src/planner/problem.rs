@@ -33,14 +33,13 @@ use crate::trajectory::variables::FootVariables;
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
-
 use super::bounds::{given_rows, variable_bounds};
+use super::following::{Change, Following};
 use super::threads::ThreadSplit;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::sink::{Gradient, Pattern, Sink};
-use crate::nlp::{Constraint, Cost, LegTerms, Model, State, foot_in_base};
+use crate::nlp::{Constraint, Cost, LegTerms, Model, State};
 
 /// The objective is this times the scenario's costs: Ipopt's tests of optimality are absolute, and with an objective of the
 /// order of one a solve takes a third of the iterations (rippled, medium: 25 instead of 65).
@@ -71,6 +70,8 @@ pub struct GaitProblem {
     evaluated: Vec<f64>,
     curved: bool,
     initial: Vec<f64>,
+    /// Updates the terms of the legs' mass during a solve.
+    pub following: Option<Following>,
     /// To start from, if there are any.
     pub multipliers: Option<Multipliers>,
     /// Rows that a given start leaves no variable of.
@@ -205,6 +206,7 @@ impl GaitProblem {
             jacobian,
             hessian,
             initial,
+            following: None,
             multipliers: None,
             lower,
             upper,
@@ -234,28 +236,21 @@ impl GaitProblem {
     /// Evaluates the nodes at x, unless they already are.
     pub fn update(&mut self, x: &[f64], curved: bool) {
         if (curved && !self.curved) || self.evaluated != x {
+            if let Some(terms) =
+                self.following.as_mut().filter(|_| self.evaluated != x).and_then(Following::take)
+            {
+                Arc::make_mut(&mut self.model).leg_terms = terms;
+            }
             self.state.update(&self.model, x, curved);
             self.evaluated.copy_from_slice(x);
             self.curved = curved;
         }
     }
 
-    /// By how much the torques that the legs' mass adds to Euler's law at x differ from others: root mean square and largest, m g · 1 m.
-    pub fn leg_torque_change(&mut self, x: &[f64], other: &LegTerms) -> [f64; 2] {
+    /// By how much the torques that the legs' mass adds to Euler's law at x differ from those of other terms.
+    pub fn leg_torque_change(&mut self, x: &[f64], other: &LegTerms) -> Change {
         self.update(x, false);
-        let samples = self.model.layout.intervals + 1;
-        let torques = |terms: &LegTerms| -> Vec<Vector3<f64>> {
-            let mut torques: Vec<Vector3<f64>> = (0..samples).map(|k| terms.torque(k)).collect();
-            for inertia in &terms.inertia {
-                torques[inertia.sample] += foot_in_base::inertial_torque(&self.model, &self.state, inertia);
-            }
-            torques
-        };
-        let (ours, theirs) = (torques(&self.model.leg_terms), torques(other));
-        let squares = ours.iter().zip(&theirs).map(|(a, b)| (a - b).norm_squared());
-        let (sum, most) =
-            squares.fold((0.0, 0.0_f64), |(sum, most), square| (sum + square, most.max(square)));
-        [(sum / samples as f64).sqrt(), most.sqrt()]
+        Change::between(&self.model, &self.state, other)
     }
 
     /// Name of a variable, for messages.
@@ -458,6 +453,10 @@ impl NlpProblem for GaitProblem {
         out: &mut [f64],
     ) {
         self.update(x, true);
+        // Ipopt asks for second derivatives once at every iterate, and in its restoration phase without the objective.
+        if let Some(following) = self.following.as_mut().filter(|_| objective_factor != 0.0) {
+            following.observe(&self.model, &self.state, x);
+        }
         if let Some(hessian) = &mut self.hessian {
             let terms = Terms {
                 model: &self.model,

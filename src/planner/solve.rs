@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::base_path::BasePath;
 use super::elastic::{self, Explanation};
+use super::following::{Following, LEVER};
 use super::guess;
 use super::iterate::Iterate;
 use super::legs::{self, BodyMotion, FINE};
@@ -35,12 +36,8 @@ const LEVEL: f64 = 1e-6;
 const PLAIN_FRACTION: f64 = 0.5;
 /// Solves with another estimate of what the legs' mass adds, at most.
 const LEG_ROUNDS: usize = 6;
-/// By how much the torque that it adds may still change, rms and at most, m g · 1 m.
-const LEG_TOLERANCE: [f64; 2] = [0.0015 * LEVER, 0.005 * LEVER];
 /// Looking for a reason takes twice as long as the solve at most, or this long if that is more, s.
 const LEAST_SECONDS: u64 = 30;
-/// m, with which torques are compared with the weight.
-const LEVER: f64 = 0.3;
 
 /// What is to be planned.
 #[derive(Clone, Copy)]
@@ -150,6 +147,7 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         ),
         (false, steps) => ("also with a continuation", solve.continuation(steps)?),
     };
+    let second = second.map(|second| solve.with_leg_mass(second)).transpose()?;
     let mut end = match second {
         None => first,
         Some(second) if second.feasible && second.stage.is_whole() => second,
@@ -279,7 +277,7 @@ impl<'a> Solve<'a> {
                 break;
             }
             let stage = Stage::Continuation { step, steps };
-            let Some(model) = self.scaled_model(stage)? else {
+            let Some(mut model) = self.scaled_model(stage)? else {
                 self.interrupted = true;
                 break;
             };
@@ -290,6 +288,7 @@ impl<'a> Solve<'a> {
                 start = Start::Feasible;
             }
             let effort = if stage.is_whole() { scenario.solver.effort } else { Effort::Feasible };
+            model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
             let mut end = self.stage(stage, model, x, start, effort, left)?;
             if !end.feasible && !stage.is_whole() {
                 let percent = 100.0 * stage.height_fraction();
@@ -330,12 +329,12 @@ impl<'a> Solve<'a> {
                 break;
             }
             let Some(terms) = self.leg_terms(&end.problem.model, &end.x) else { break };
-            let [rms, most] = end.problem.leg_torque_change(&end.x, &terms);
-            if rms < LEG_TOLERANCE[0] && most < LEG_TOLERANCE[1] {
+            let change = end.problem.leg_torque_change(&end.x, &terms);
+            if change.is_within(1.0) {
                 break;
             }
             if round > LEG_ROUNDS || left == 0 {
-                let percent = 100.0 * rms / LEVER;
+                let percent = 100.0 * change.rms / LEVER;
                 end.status = format!(
                     "{}; the torques of the legs' mass have not settled, by {percent:.2} % of m g · 0.3 m",
                     end.status
@@ -388,8 +387,17 @@ impl<'a> Solve<'a> {
         } else {
             Hessian::LimitedMemory
         });
-        let choice = Choice { with_costs, exact_hessian: hessian == Hessian::Exact };
+        let exact = hessian == Hessian::Exact;
+        let choice = Choice { with_costs, exact_hessian: exact };
         let mut problem = GaitProblem::new(scenario, model, x, choice);
+        // A round is the same problem again; an approximated Hessian takes other terms for curvature.
+        if exact
+            && stage.is_whole()
+            && !matches!(stage, Stage::LegMass { .. })
+            && problem.model.body.is_some()
+        {
+            problem.following = Some(Following::new(scenario.physics.law));
+        }
         let centered =
             (&start, hessian, scenario.formulation()) == (&Start::Guess, Hessian::Exact, Formulation::Warped);
         let mut options = options::of(&scenario.solver, hessian, centered, budget);
@@ -424,6 +432,7 @@ impl<'a> Solve<'a> {
             rule.observe(record, x)
         })
         .map_err(|error| Error::Internal(error.to_string()))?;
+        let followed = problem.following.take().is_some();
         self.linear_solver = solution.linear_solver;
         self.iterations += solution.history.last().map_or(0, |r| r.iteration);
         self.seconds.evaluation += solution.evaluation_seconds;
@@ -438,7 +447,12 @@ impl<'a> Solve<'a> {
         let interrupted = stopped || solution.status == Status::Interrupted;
         let satisfied = rule.is_satisfied();
         let last_feasible = violation::is_feasible(&mut problem, &solution.x, tolerance);
-        let x = rule.best(solution.x, solution.objective, last_feasible);
+        // With the terms of the last iterate, one before it may not be feasible.
+        let x = if followed && last_feasible {
+            solution.x
+        } else {
+            rule.best(solution.x, solution.objective, last_feasible)
+        };
         let feasible = violation::is_feasible(&mut problem, &x, tolerance);
         let status = status(solution.status, feasible, satisfied, with_costs);
         Ok(StageEnd { stage, problem, x, multipliers, mu, feasible, interrupted, status })
@@ -475,11 +489,15 @@ impl<'a> Solve<'a> {
         // Plans are sampled from the motion as it is, at the switches that were found.
         let mut model = Arc::unwrap_or_clone(end.problem.model);
         model.layout.freeze(&end.x);
-        let settled = BodyMotion::new(&model, &end.x, FINE).and_then(|body| body.settled(&end.x));
+        let mut body = BodyMotion::new(&model, &end.x, FINE);
+        let settled = body.as_mut().and_then(|body| body.settle(&end.x));
+        if settled.is_none() {
+            body = BodyMotion::new(&model, &end.x, FINE);
+        }
+        let legs = body.map(|body| body.samples(&end.x));
         if let Some((layout, x)) = settled {
             (model.layout, end.x) = (layout, x);
         }
-        let legs = BodyMotion::new(&model, &end.x, FINE).map(|body| body.samples(&end.x));
         Motion {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,
