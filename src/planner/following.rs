@@ -72,7 +72,7 @@ impl Following {
     /// Looks at an iterate x, of which the state is.
     pub fn observe(&mut self, model: &Model, state: &State, x: &[f64]) {
         self.iterates += 1;
-        if self.iterates % EVERY != 0 {
+        if !self.iterates.is_multiple_of(EVERY) {
             return;
         }
         let Some(terms) = legs::terms(model, x, self.law) else { return };
