@@ -4,7 +4,7 @@
 //! has moved away from: its point that is the center of mass at the nominal stance lies at p − R s. So what is fixed to the trunk sees a
 //! foot at r = Rᵀ(p_i − p) + s. Euler's law gets the rate of the angular momentum that a rigid body does not have, and a joint bears the
 //! weight and the inertia of the links below it. They are computed from a motion in `crate::planner::legs`, and updated from the iterates of a
-//! solve in `crate::planner::following`.
+//! solve in `crate::planner::leg_update`.
 //!
 //! Most of that momentum is due to the swinging feet, and varies with their accelerations. So Euler's law has, beside the known torque, the
 //! term A (r_k−1 − 2 r_k + r_k+1) for each of them with a constant matrix A; what is known is the rest. It hardly changes from one solve to the

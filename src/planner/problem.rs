@@ -34,7 +34,7 @@ use crate::trajectory::variables::FootVariables;
 use std::sync::Arc;
 
 use super::bounds::{given_rows, variable_bounds};
-use super::following::{Change, Following};
+use super::leg_update::{Change, LegUpdate};
 use super::threads::ThreadSplit;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::model::GRAVITY;
@@ -71,7 +71,7 @@ pub struct GaitProblem {
     curved: bool,
     initial: Vec<f64>,
     /// Updates the terms of the legs' mass during a solve.
-    pub following: Option<Following>,
+    pub leg_update: Option<LegUpdate>,
     /// To start from, if there are any.
     pub multipliers: Option<Multipliers>,
     /// Rows that a given start leaves no variable of.
@@ -206,7 +206,7 @@ impl GaitProblem {
             jacobian,
             hessian,
             initial,
-            following: None,
+            leg_update: None,
             multipliers: None,
             lower,
             upper,
@@ -237,7 +237,7 @@ impl GaitProblem {
     pub fn update(&mut self, x: &[f64], curved: bool) {
         if (curved && !self.curved) || self.evaluated != x {
             if let Some(terms) =
-                self.following.as_mut().filter(|_| self.evaluated != x).and_then(Following::take)
+                self.leg_update.as_mut().filter(|_| self.evaluated != x).and_then(LegUpdate::take)
             {
                 Arc::make_mut(&mut self.model).leg_terms = terms;
             }
@@ -454,8 +454,8 @@ impl NlpProblem for GaitProblem {
     ) {
         self.update(x, true);
         // Ipopt asks for second derivatives once at every iterate, and in its restoration phase without the objective.
-        if let Some(following) = self.following.as_mut().filter(|_| objective_factor != 0.0) {
-            following.observe(&self.model, &self.state, x);
+        if let Some(leg_update) = self.leg_update.as_mut().filter(|_| objective_factor != 0.0) {
+            leg_update.observe(&self.model, &self.state, x);
         }
         if let Some(hessian) = &mut self.hessian {
             let terms = Terms {

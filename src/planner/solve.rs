@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::base_path::BasePath;
 use super::elastic::{self, Explanation};
-use super::following::{Following, LEVER};
 use super::guess;
 use super::iterate::Iterate;
+use super::leg_update::{LEVER, LegUpdate};
 use super::legs::{self, BodyMotion, FINE};
 use super::motion::{Motion, Seconds};
 use super::options;
@@ -396,7 +396,7 @@ impl<'a> Solve<'a> {
             && !matches!(stage, Stage::LegMass { .. })
             && problem.model.body.is_some()
         {
-            problem.following = Some(Following::new(scenario.physics.law));
+            problem.leg_update = Some(LegUpdate::new(scenario.physics.law));
         }
         let centered =
             (&start, hessian, scenario.formulation()) == (&Start::Guess, Hessian::Exact, Formulation::Warped);
@@ -432,7 +432,7 @@ impl<'a> Solve<'a> {
             rule.observe(record, x)
         })
         .map_err(|error| Error::Internal(error.to_string()))?;
-        let followed = problem.following.take().is_some();
+        let updated = problem.leg_update.take().is_some();
         self.linear_solver = solution.linear_solver;
         self.iterations += solution.history.last().map_or(0, |r| r.iteration);
         self.seconds.evaluation += solution.evaluation_seconds;
@@ -448,7 +448,7 @@ impl<'a> Solve<'a> {
         let satisfied = rule.is_satisfied();
         let last_feasible = violation::is_feasible(&mut problem, &solution.x, tolerance);
         // With the terms of the last iterate, one before it may not be feasible.
-        let x = if followed && last_feasible {
+        let x = if updated && last_feasible {
             solution.x
         } else {
             rule.best(solution.x, solution.objective, last_feasible)

@@ -55,7 +55,7 @@ impl Change {
 
 /// Updates the terms from iterate to iterate.
 #[derive(Clone, Debug)]
-pub struct Following {
+pub struct LegUpdate {
     law: Law,
     /// Iterates so far.
     iterates: usize,
@@ -63,7 +63,7 @@ pub struct Following {
     next: Option<LegTerms>,
 }
 
-impl Following {
+impl LegUpdate {
     /// For a law.
     pub fn new(law: Law) -> Self {
         Self { law, iterates: 0, next: None }
@@ -104,7 +104,7 @@ mod tests {
         let loaded = load_text("scenario", text, ".".as_ref(), &[]).expect("a scenario");
         let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
         let mut problem = prepared.task(&loaded, None).problem().expect("a problem");
-        problem.following = Some(Following::new(Law::Pcdm));
+        problem.leg_update = Some(LegUpdate::new(Law::Pcdm));
         let mut x = vec![0.0; problem.num_variables()];
         problem.initial_point(&mut x);
         x[6..].iter_mut().enumerate().for_each(|(v, x)| *x += 1e-2 * (v as f64).sin());
