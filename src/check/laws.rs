@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::Result;
 use crate::input::{Document, closest};
+use crate::plan::MetaRobot;
 
 /// One law.
 #[derive(Debug, PartialEq)]
@@ -13,7 +14,7 @@ pub struct CheckedLaw {
     pub name: &'static str,
     /// Unit of its value.
     pub unit: &'static str,
-    /// Largest value allowed by default; none if it is only reported.
+    /// Largest value allowed by default for a robot of ANYmal's size; none if it is only reported.
     pub limit: Option<f64>,
     /// Limit under `--strict`, where that differs.
     pub strict: Option<f64>,
@@ -144,6 +145,28 @@ laws! {
     LEAST_CLEARANCE = "base_clearance_least", "mm", None, None, "least distance of the torso's underside from the ground";
 }
 
+/// Limits that are for robots as tall as ANYmal: torques and lengths are compared with the robot's height.
+const BY_HEIGHT: [&CheckedLaw; 4] = [EULER_RMS, EULER_MAX, MOMENTUM, GROUND_MOVED];
+/// Limits that are for ANYmal's feet: the ground under a foot is compared with the foot.
+const BY_FOOT: [&CheckedLaw; 2] = [PATCH_ROUGHNESS, PATCH_OFFSET];
+/// Standing height and radius of the feet for which they are, m.
+const ANYMAL_HEIGHT: f64 = 0.42;
+const ANYMAL_FOOT: f64 = 0.03;
+
+/// Which part of a law's default limit holds for a robot. It is smaller for smaller robots, and not larger for larger ones.
+fn part(law: &CheckedLaw, robot: &MetaRobot) -> f64 {
+    let is_in = |laws: &[&CheckedLaw]| laws.iter().any(|known| known.name == law.name);
+    let part = if is_in(&BY_HEIGHT) && !robot.nominal.is_empty() {
+        let height = -robot.nominal.iter().map(|foot| foot[2]).sum::<f64>() / robot.nominal.len() as f64;
+        height / ANYMAL_HEIGHT
+    } else if is_in(&BY_FOOT) {
+        robot.foot_radius / ANYMAL_FOOT
+    } else {
+        1.0
+    };
+    part.clamp(0.0, 1.0)
+}
+
 /// The limits in force.
 #[derive(Clone, Debug, Default)]
 pub struct CheckLimits {
@@ -179,9 +202,10 @@ impl CheckLimits {
         Ok(self)
     }
 
-    /// The limit of a law, if it has one.
-    pub fn of(&self, law: &CheckedLaw) -> Option<f64> {
+    /// The limit of a law for a robot, if it has one. One that was read from a file is as given.
+    pub(super) fn of(&self, law: &CheckedLaw, robot: &MetaRobot) -> Option<f64> {
         let strict = if self.strict { law.strict } else { None };
-        self.changed.get(law.name).copied().or(strict).or(law.limit)
+        let usual = strict.or(law.limit).map(|limit| part(law, robot) * limit);
+        self.changed.get(law.name).copied().or(usual)
     }
 }

@@ -78,7 +78,7 @@ pub fn check_with(plan: &Plan, limits: &CheckLimits) -> Result<CheckReport> {
     // In the order of the table of laws.
     findings.sort_by_key(|(law, _)| LAWS.iter().position(|known| known.name == law.name));
     for (law, worst) in findings {
-        let limit = limits.of(law);
+        let limit = limits.of(law, &subject.robot);
         let row = CheckRow {
             name: law.name.into(),
             value: worst.value,
