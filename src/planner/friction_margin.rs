@@ -1,7 +1,8 @@
 //! A solve; and when no motion is found: would one be, if the plan used more of the friction?
 
 use super::motion::Motion;
-use super::solve::{Host, Task, attempt};
+use super::solve::{Host, attempt};
+use super::task::Task;
 use super::why::attempt_or_explain;
 use crate::Result;
 use crate::scenario::{Effort, Scenario};

@@ -17,6 +17,7 @@
 //! | `legs` | what the legs' own mass adds to the laws, from a motion |
 //! | `leg_update` | the same from the iterates of a solve, while it runs |
 //! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
+//! | `task` | what is to be planned, as a model and as a program |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
 //! | `friction_margin` | the same, and what a smaller margin of friction would do |
 //! | `elastic`, `why` | when no motion is found: which limits would have to give |
@@ -54,6 +55,7 @@ mod standing;
 mod start;
 mod steps;
 mod stopping;
+mod task;
 mod threads;
 mod travel;
 pub mod violation;
@@ -66,6 +68,7 @@ pub use iterate::{Iterate, IterateSamples};
 pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
-pub use solve::{Host, Progress, Task};
+pub use solve::{Host, Progress};
 pub use stage::Stage;
 pub use steps::Steps;
+pub use task::Task;

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::base_path::BasePath;
 use super::elastic::{self, Explanation};
 use super::guess;
 use super::iterate::Iterate;
@@ -14,15 +13,13 @@ use super::motion::{Motion, Seconds};
 use super::options;
 use super::problem::{Choice, GaitProblem};
 use super::stage::Stage;
-use super::start;
-use super::steps::Steps;
 use super::stopping::StoppingRule;
+use super::task::Task;
 use super::violation;
 use crate::heightfield::Heightfield;
 use crate::ipopt::{self, INTERRUPT, IterationRecord, LinearSolver, Multipliers, Status};
 use crate::nlp::{LegTerms, Model};
-use crate::robot::Robot;
-use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, GivenMotion, Hessian, Scenario};
+use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, GivenMotion, Hessian};
 use crate::terrain::Surfaces;
 use crate::trajectory::Spaces;
 use crate::warp::WarpMap;
@@ -38,52 +35,6 @@ const PLAIN_FRACTION: f64 = 0.5;
 const LEG_ROUNDS: usize = 6;
 /// Looking for a reason takes twice as long as the solve at most, or this long if that is more, s.
 const LEAST_SECONDS: u64 = 30;
-
-/// What is to be planned.
-#[derive(Clone, Copy)]
-pub struct Task<'a> {
-    /// The scenario.
-    pub scenario: &'a Scenario,
-    /// Its robot.
-    pub robot: &'a Robot,
-    /// When the feet step, and where.
-    pub steps: &'a Steps,
-    /// Its ground.
-    pub surfaces: &'a Surfaces,
-    /// A motion to start from, where the scenario gives one.
-    pub guess: Option<&'a GivenMotion>,
-    /// The map over the posture surface, for all formulations but the direct one.
-    pub map: Option<&'a WarpMap>,
-}
-
-impl Task<'_> {
-    /// The model over the whole terrain.
-    fn model(&self) -> Result<Model> {
-        let map = self.map.map(|map| Arc::new(map.clone()));
-        let spaces = Spaces::of(self.scenario.formulation(), map)?;
-        let Self { scenario, robot, steps, surfaces, .. } = *self;
-        let model = Model::new(scenario, robot, &steps.gait, surfaces.clone(), spaces);
-        self.completed(Model { patches: steps.patches.clone(), ..model })
-    }
-
-    /// The model with the given state at the start, and with the times at which the guess passes the way-points.
-    fn completed(&self, mut model: Model) -> Result<Model> {
-        start::set(self.scenario, &mut model)?;
-        model.visits = BasePath::new(self.scenario, &model)?.visits(self.scenario);
-        Ok(model)
-    }
-
-    /// The NLP at its guess, for checks of its derivatives and for timing.
-    ///
-    /// # Errors
-    /// Those of the guess.
-    pub fn problem(&self) -> Result<GaitProblem> {
-        let mut model = self.model()?;
-        let x = guess::guess(self.scenario, &model, self.guess)?;
-        model.leg_terms = legs::terms(&model, &x, self.scenario.physics.law).unwrap_or_default();
-        Ok(GaitProblem::new(self.scenario, model, x, Choice { with_costs: true, exact_hessian: true }))
-    }
-}
 
 /// An iteration, for progress displays.
 #[derive(Clone, Debug)]

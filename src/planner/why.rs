@@ -3,8 +3,9 @@
 
 use super::elastic::Shortfall;
 use super::motion::Motion;
-use super::solve::{Host, Task, attempt};
+use super::solve::{Host, attempt};
 use super::steps::Steps;
+use super::task::Task;
 use crate::Result;
 use crate::scenario::{Effort, Scenario};
 
