@@ -3,6 +3,7 @@
 //! The base's position is the center of mass of all of them, so the trunk is where the legs leave it: its point that is the center of
 //! mass at the nominal stance is at p − R s. The shift s depends on the postures of the legs, and these on s.
 
+use super::subject::switches;
 use super::vector::{
     Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, sub, transposed, turn_between,
 };
@@ -277,7 +278,9 @@ fn centers(plan: &Plan, legs: &[Leg]) -> Vec<[f64; 3]> {
                 let before = (0..n).rev().find(|&n| standing(n));
                 let after = (n..samples).find(|&n| standing(n));
                 if let (Some(before), Some(after)) = (before, after) {
-                    let u = (n - before) as f64 / (after - before) as f64;
+                    let [lift_off, touch_down] =
+                        switches(plan, e, plan.t[n]).unwrap_or([plan.t[before], plan.t[after]]);
+                    let u = (plan.t[n] - lift_off) / (touch_down - lift_off);
                     let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
                     let between = add(scale(1.0 - s, normal(before)), scale(s, normal(after)));
                     direction = scale(1.0 / norm(between), between);
