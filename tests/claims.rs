@@ -146,6 +146,16 @@ const CONDITIONS: &str = "[posture]\nheight = [0.38, 0.46]\nroll = [-0.2, 0.2]\n
     [[foothold]]\nfoot = \"LF\"\nstep = 1\nposition = [0.4, 0.28]\n\
     [[keep_out]]\npolygon = [[0.45, -0.2], [0.6, -0.3], [0.65, -0.1]]\n";
 
+/// A foot in the middle of a step.
+const IN_THE_AIR: &str = "[start.state]\nswings = [[0.1, 0.2], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]\n\
+    feet = [[0.26, 0.2, 0.04], [0.24, -0.19, 0.0], [-0.44, 0.19, 0.0], [-0.44, -0.19, 0.0]]\n\
+    feet_velocity = [[0.4, 0.0, 0.1], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]\n";
+
+/// A cycle up a slope.
+const CYCLE: &str = "[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"formula\"\nexpression = \"0.1*x\"\n\
+    extent = [-1.0, 1.5, -1.0, 1.0]\nspacing = 0.05\n[start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.4, 0.0]\nspeed = 0.4\n\
+    [gait]\nkind = \"trot\"\nduty = 0.6\nperiodic = true\n";
+
 #[test]
 fn every_member_is_covered_by_a_law() {
     let folder = tempfile::tempdir().unwrap();
@@ -161,6 +171,8 @@ fn every_member_is_covered_by_a_law() {
         ripples("direct", WAYPOINTS),
         ripples("hybrid", CONDITIONS).replace("[-0.1, 0.0]", "[-0.1, 0.0]\nyaw = 0.1"),
         ripples("hybrid", "[start.state]\nvelocity = [0.1, 0.0, 0.0]\nangular_velocity = [0.0, 0.0, 0.1]\n"),
+        ripples("direct", IN_THE_AIR).replace("rippled", "flat").replace("spacing = 0.02\n", ""),
+        CYCLE.to_owned(),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();

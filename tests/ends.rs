@@ -1,9 +1,11 @@
 //! Motions that start or end moving, from a given state, and one after the other.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::common::solved_in;
 use warpgait::check::{CheckReport, check};
+use warpgait::pipeline::Prepared;
 use warpgait::plan::Plan;
 
 fn failed(report: &CheckReport) -> Vec<String> {
@@ -171,4 +173,18 @@ fn starts_that_contradict_themselves_are_refused() {
             warpgait::scenario::load_text("s.toml", &text, folder.path(), &[]).expect_err(start).to_string();
         assert!(message.contains(words), "{message}");
     }
+}
+
+#[test]
+fn a_goal_at_the_edge_is_refused_with_the_heading_of_arrival() {
+    let text = "formulation = \"direct\"\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nextent = [-1.0, 1.0, -1.0, 1.0]\n[start]\nposition = [0.0, 0.0]\n\
+                [goal]\nposition = [0.4, 0.7]\n[[goal.waypoints]]\nposition = [0.4, 0.2]\n";
+    let prepared = |text: &str| {
+        let loaded = warpgait::scenario::load_text("s.toml", text, ".".as_ref(), &[]).expect("a scenario");
+        Prepared::new(&loaded, &mut |_| ControlFlow::Continue(()))
+            .and_then(|p| p.task(&loaded, None).problem())
+    };
+    let message = prepared(text).err().expect("a refusal").to_string();
+    assert!(message.contains("goal.position: given [0.4, 0.7], where foot LF would stand 0.0"), "{message}");
+    assert!(prepared(&text.replace("0.7]", "0.5]")).is_ok());
 }

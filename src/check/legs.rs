@@ -3,7 +3,6 @@
 //! The base's position is the center of mass of all of them, so the trunk is where the legs leave it: its point that is the center of
 //! mass at the nominal stance is at p − R s. The shift s depends on the postures of the legs, and these on s.
 
-use super::subject::switches;
 use super::vector::{
     Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, sub, transposed, turn_between,
 };
@@ -279,7 +278,7 @@ fn centers(plan: &Plan, legs: &[Leg]) -> Vec<[f64; 3]> {
                 let after = (n..samples).find(|&n| standing(n));
                 if let (Some(before), Some(after)) = (before, after) {
                     let [lift_off, touch_down] =
-                        switches(plan, e, plan.t[n]).unwrap_or([plan.t[before], plan.t[after]]);
+                        plan.swing_at(e, plan.t[n]).unwrap_or([plan.t[before], plan.t[after]]);
                     let u = (plan.t[n] - lift_off) / (touch_down - lift_off);
                     let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
                     let between = add(scale(1.0 - s, normal(before)), scale(s, normal(after)));

@@ -131,7 +131,7 @@ impl<'a> Subject<'a> {
             match (before, after) {
                 (Some(a), Some(b)) => {
                     let [lift_off, touch_down] =
-                        switches(self.plan, e, self.plan.t[n]).unwrap_or([self.plan.t[a], self.plan.t[b]]);
+                        self.plan.swing_at(e, self.plan.t[n]).unwrap_or([self.plan.t[a], self.plan.t[b]]);
                     at(a) + (self.plan.t[n] - lift_off) / (touch_down - lift_off) * (at(b) - at(a))
                 }
                 (Some(stands), None) | (None, Some(stands)) => at(stands),
@@ -151,12 +151,6 @@ impl<'a> Subject<'a> {
         let feet = self.feet;
         (0..self.samples).flat_map(move |n| (0..feet).map(move |e| (n, e)))
     }
-}
-
-/// Lift-off and touch-down of the swing of a foot around a time, s.
-pub(super) fn switches(plan: &Plan, e: usize, time: f64) -> Option<[f64; 2]> {
-    let mut swings = plan.phases(e).into_iter().skip(1).step_by(2);
-    swings.find(|[start, end]| (*start..=*end).contains(&time))
 }
 
 /// The largest value seen, and where.

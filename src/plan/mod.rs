@@ -102,6 +102,12 @@ impl Plan {
         edges.windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }
 
+    /// Lift-off and touch-down of the swing of a foot around a time, s.
+    pub fn swing_at(&self, foot: usize, time: f64) -> Option<[f64; 2]> {
+        let mut swings = self.phases(foot).into_iter().skip(1).step_by(2);
+        swings.find(|[start, end]| (*start..=*end).contains(&time))
+    }
+
     /// SHA-256 (hexadecimal) of the history and the largest violation, as in `meta.solver`.
     pub fn history_sha256(&self) -> String {
         let columns = [&self.history_objective, &self.history_constraint_violation, &self.history_seconds];

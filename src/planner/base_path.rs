@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::pace::{Pace, interpolated};
 use super::retiming::{Corridor, retimed};
-use super::standing::{Pose, allowed, ensure_reach, pulled_back, standing_pose};
+use super::standing::{Pose, allowed, ensure_ground_at_goal, ensure_reach, pulled_back, standing_pose};
 use super::start;
 use super::way::{Place, Way};
 use crate::Result;
@@ -95,7 +95,9 @@ impl<'a> BasePath<'a> {
             y[5] = expected + wrapped(y[5] - expected);
             y
         };
-        let last = pulled_back(&model.spaces.base, &standing(goal, scenario.goal.height))?;
+        let arrived = standing(goal, scenario.goal.height);
+        ensure_ground_at_goal(model, &arrived, scenario.goal.position)?;
+        let last = pulled_back(&model.spaces.base, &arrived)?;
         let last = unwound(last, goal[2]);
         let bent = (model.spaces.base.is_warped() && !way.is_straight()).then(|| {
             way.places().map(|(_, place)| Ok(unwound(in_variables(*place)?, place[2]))).collect::<Result<_>>()

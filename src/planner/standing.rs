@@ -126,6 +126,28 @@ pub fn ensure_reach(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
     Ok(())
 }
 
+/// Where the robot arrives, every foot must have ground under its nominal place. (What the scenario alone tells is refused before.)
+pub fn ensure_ground_at_goal(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
+    let [x_min, x_max, y_min, y_max] = model.surfaces.feet.extent();
+    for (name, nominal) in model.foot_names.iter().zip(&model.nominal) {
+        let foot = pose.position + pose.rotation * nominal;
+        let along = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
+        let outside = along(foot.x, x_min, x_max).hypot(along(foot.y, y_min, y_max));
+        if outside > 0.0 {
+            return Err(Error::key(
+                "goal.position",
+                format!(
+                    "given [{}, {}], where foot {name} would stand {outside:.3} m outside the terrain, as the robot arrives with a heading of {:.2} rad; choose another goal or goal.yaw",
+                    xy[0],
+                    xy[1],
+                    euler_angles(&pose.rotation).z
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
