@@ -14,7 +14,7 @@ import crawl
 from warpgait import criteria
 from warpgait.adhesion import BUILD_UP, RESERVE, adhesion
 from warpgait.closedloop import ClosedLoop, robot_of, world_of
-from warpgait.controllers import WholeBody
+from warpgait.controllers import Gains, WholeBody, gains_for
 from warpgait.criteria import Criterion, Metric, Verdict
 from warpgait.metrics import ROBUST
 from warpgait.model import adhesion_name, find_model, load_spec
@@ -38,6 +38,13 @@ def loop_of(plan: Plan) -> ClosedLoop:
 def value(metrics: list[Metric], criterion: Criterion) -> float:
     """Of the metric with this criterion."""
     return next(m.value for m in metrics if m.criterion is criterion)
+
+
+def test_gains_follow_the_time_in_which_a_robot_falls() -> None:
+    anymal, small = gains_for(1.0), gains_for(0.25)
+    assert anymal == Gains()
+    for of_anymal, of_small in [(anymal.com, small.com), (anymal.rotation, small.rotation), (anymal.swing, small.swing)]:
+        assert of_small == (4 * of_anymal[0], 2 * of_anymal[1])
 
 
 def test_a_standing_robot_stays_level_under_a_load_that_tipped_it_before(standing_plan: Path) -> None:

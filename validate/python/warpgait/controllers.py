@@ -53,7 +53,7 @@ def friction_cones(normal: Array, friction: float) -> Array:
 
 @dataclass(frozen=True)
 class Gains:
-    """Feedback gains (stiffness 1/s², damping 1/s) and task weights.
+    """Feedback gains (stiffness 1/s², damping 1/s) and task weights, for a robot of ANYmal's size.
 
     The gains are those of accelerations, so that forces and torques follow the robot's inertia.
     """
@@ -78,11 +78,20 @@ class Gains:
 def gains_for(size: float) -> Gains:
     """Gains for a robot of a size in ANYmals: lengths are proportional to it, forces to its cube, as weights are.
 
-    The weight of forces compares them with accelerations, so it is that of forces by the robot's mass.
+    It falls in a time proportional to the root of the size, which is what the gains must keep up with. The weight of forces compares them with accelerations, so it is that of forces by the robot's mass.
     """
     g = Gains()
+    slower = size**0.5
+
+    def pair(stiffness_damping: tuple[float, float]) -> tuple[float, float]:
+        return stiffness_damping[0] / size, stiffness_damping[1] / slower
+
     return replace(
         g,
+        com=pair(g.com),
+        rotation=pair(g.rotation),
+        swing=pair(g.swing),
+        stance_damping=g.stance_damping / slower,
         reach_down=size * g.reach_down,
         seek=(size * g.seek[0], size * g.seek[1]),
         touch_force=size**3 * g.touch_force,
