@@ -172,7 +172,6 @@ fn every_member_is_covered_by_a_law() {
         ripples("hybrid", CONDITIONS).replace("[-0.1, 0.0]", "[-0.1, 0.0]\nyaw = 0.1"),
         ripples("hybrid", "[start.state]\nvelocity = [0.1, 0.0, 0.0]\nangular_velocity = [0.0, 0.0, 0.1]\n"),
         ripples("direct", IN_THE_AIR).replace("rippled", "flat").replace("spacing = 0.02\n", ""),
-        CYCLE.to_owned(),
     ] {
         let (_, plan) = solved(&text);
         plan.write(&good).unwrap();
@@ -201,6 +200,9 @@ fn every_member_is_covered_by_a_law() {
         assert!(plan.ground.unknown.is_some(), "{more}");
         reported.extend(report.rows.into_iter().chain(report.figures).map(|row| row.name));
     }
+    // Slow cycles on a plane hardly change when they are spoiled; `cyclic.rs` spoils their ends.
+    let cycle = check(&solved(CYCLE).1).unwrap();
+    reported.extend(cycle.rows.into_iter().map(|row| row.name));
     // Together, these plans are judged by all laws.
     let unused: Vec<&str> =
         LAWS.iter().map(|law| law.name).filter(|name| !reported.contains(*name)).collect();
