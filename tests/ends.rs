@@ -148,6 +148,11 @@ fn starts_that_contradict_themselves_are_refused() {
             "plan = \"before.plan.npz\"\nposition = [0.0, 0.0]",
             "start.position: given together with start.plan (start.plan, line",
         ),
+        ("plan = \"before.plan.npz\"\ntime = \"mid\"", "start.time: given \"mid\", allowed: a number"),
+        (
+            "position = [0.0, 0.0]\nstate.swings = [[0.1, 0.2], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]",
+            "start.state.swings: given without",
+        ),
         ("plan = \"before.plan.npz\"\ntime = 5.0", "start.time: given 5 s, allowed: 0 to 1 s"),
         ("position = [0.0, 0.0]\ntime = 1.0", "start.time: given without start.plan"),
         (

@@ -37,7 +37,11 @@ pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<
             return Err(document.error(key, what));
         }
     }
-    let time = start.and_then(|start| start.get("time")).and_then(number);
+    let time = start.and_then(|start| start.get("time"));
+    if let Some(given) = time.filter(|time| number(time).is_none()) {
+        return Err(document.error("start.time", format!("given {given}, allowed: a number of seconds")));
+    }
+    let time = time.and_then(number);
     let path = base_dir.join(&name);
     let located = |e: Error| document.error("start.plan", e);
     let digest = sha256_hex(files::read(&path, files::MAX_FILE).map_err(located)?);

@@ -42,9 +42,15 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Rob
 fn in_air(document: &Document, scenario: &Scenario) -> Result<()> {
     let (start, gait) = (&scenario.start, &scenario.gait);
     let state = start.state.as_ref();
-    if state.is_some_and(|state| state.feet_velocity.is_some() && state.feet.is_none()) {
-        let what = "given without start.state.feet, where the feet are; add these";
-        return Err(document.error("start.state.feet_velocity", what));
+    let lacks_feet = |key: &str| {
+        document.error(
+            &format!("start.state.{key}"),
+            "given without start.state.feet, where the feet are; add these",
+        )
+    };
+    let alone = state.filter(|state| state.feet.is_none());
+    if alone.is_some_and(|state| state.feet_velocity.is_some()) {
+        return Err(lacks_feet("feet_velocity"));
     }
     let swings = state.and_then(|state| state.swings.as_deref()).unwrap_or_default();
     for (foot, [since, left]) in swings.iter().enumerate() {
@@ -68,8 +74,12 @@ fn in_air(document: &Document, scenario: &Scenario) -> Result<()> {
             return Err(document.error(&format!("gait.phases[{foot}]"), what));
         }
     }
+    let has_places = || match alone {
+        Some(state) if state.swings.is_some() => Err(lacks_feet("swings")),
+        _ => Ok(()),
+    };
     if !scenario.is_in_air() {
-        return Ok(());
+        return has_places();
     }
     let key = if swings.is_empty() { "gait.phases" } else { "start.state.swings" };
     let because = format!("a foot is in the air at an end ({})", document.place(key));
@@ -86,7 +96,7 @@ fn in_air(document: &Document, scenario: &Scenario) -> Result<()> {
             format!("patches are for feet that stand at both ends, but {because}; allowed: \"anywhere\"");
         return Err(document.error("contact.footholds", what));
     }
-    Ok(())
+    has_places()
 }
 
 /// A base that moves at an end is planned in ambient space, as one rigid body, with the centered law.

@@ -14,9 +14,24 @@ pub(super) fn swings(
     intervals: usize,
     step: f64,
 ) -> Result<Vec<Vec<Swing>>> {
-    let (swing, last) = (cadence.swing(step)?, intervals as f64);
-    let cycle = cadence.cycle / step;
-    let seam = seam(lift_offs, 1.0 - cadence.duty);
+    let last = intervals as f64;
+    let with = |swing: f64| around_seam(lift_offs, swing, cadence.cycle / step, last);
+    let usual = cadence.swing(step)?;
+    let found = with(usual);
+    // A stance that takes no time at the seam has no forces. A swing that is shorter by a time step leaves room for both of its parts.
+    let ends_there = |swings: &[Vec<Swing>]| swings.iter().flatten().any(|s| s.start == 0.0 || s.end == last);
+    if ends_there(&found) {
+        let shorter = with(usual - 1.0);
+        if usual > 2.0 && !ends_there(&shorter) {
+            return Ok(shorter);
+        }
+    }
+    Ok(found)
+}
+
+/// The same for swings and cycles of so many intervals.
+fn around_seam(lift_offs: &[f64], swing: f64, cycle: f64, last: f64) -> Vec<Vec<Swing>> {
+    let seam = seam(lift_offs, swing / cycle);
     let of_foot = |lift_off: &f64| {
         let first = (lift_off - seam).rem_euclid(1.0);
         let mut starts: Vec<f64> =
@@ -26,7 +41,7 @@ pub(super) fn swings(
         let within = |start: &f64| *start < last && start + swing > 0.0;
         starts.into_iter().filter(within).map(|start| Swing::given(start, start + swing)).collect()
     };
-    Ok(lift_offs.iter().map(of_foot).collect())
+    lift_offs.iter().map(of_foot).collect()
 }
 
 /// The middle of the longest time at which the most feet stand, as a fraction of the cycle, if each lifts off at its fraction and swings for
@@ -55,6 +70,14 @@ mod tests {
         assert_eq!(swings[0], swings[3]);
         assert_eq!(swings[0], [Swing::given(1.0, 7.0), Swing::given(17.0, 23.0)]);
         assert_eq!(swings[1], [Swing::given(9.0, 15.0), Swing::given(25.0, 31.0)]);
+    }
+
+    #[test]
+    fn no_stance_at_the_seam_is_without_duration() {
+        // Swings of 6.7 intervals become 7; then 2 of 16 intervals are left for four stances.
+        let cadence = Cadence { cycle: 0.8, duty: 0.58 };
+        let swings = swings(&cadence, &[0.0, 0.5, 0.5, 0.0], 16, 0.05).expect("steps");
+        assert!(swings.iter().flatten().all(|swing| swing.start > 0.0 && swing.end < 16.0), "{swings:?}");
     }
 
     #[test]

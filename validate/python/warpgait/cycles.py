@@ -80,14 +80,27 @@ def cycle_of(plan: Plan) -> Cycle:
     return Cycle(float(between.as_rotvec()[0, 2]), plan.base_position[0], shift)
 
 
+def _ensure_ground(plan: Plan, cycle: Cycle, count: int) -> None:
+    """Refuse more cycles than the plan's ground is long."""
+    x_min, x_max, y_min, y_max = plan.terrain.extent
+    for n in range(1, count):
+        x, y, _ = np.moveaxis(cycle.moved(plan.foot_position, n), -1, 0)
+        if x.min() < x_min or x.max() > x_max or y.min() < y_min or y.max() > y_max:
+            raise InputError(
+                f"--repeat {count}: the feet leave the plan's ground in cycle {n + 1}; at most {n}, or plan with a larger terrain.extent"
+            )
+
+
 def repeated(plan: Plan, count: int) -> Plan:
-    """`count` cycles of a cyclic plan as one; raises `InputError` for a plan that is not cyclic, and for counts below 1 or too large."""
+    """`count` cycles of a cyclic plan as one; raises `InputError` for a plan that is not cyclic, for counts below 1 or too large, and where
+    the ground ends."""
     if count == 1:
         return plan
     if count < 1 or count * plan.duration > LONGEST:
         most = int(LONGEST / plan.duration)
         raise InputError(f"--repeat {count}: must be from 1 to {most}, with which the motion lasts {LONGEST:g} s at most")
     cycle = cycle_of(plan)
+    _ensure_ground(plan, cycle, count)
     # The first sample of each cycle but the first is the last one of the cycle before.
     kept = [(n, slice(0 if n == 0 else 1, None)) for n in range(count)]
     joined: dict[str, Any] = {

@@ -82,7 +82,7 @@ def motion_for(plan: Path, target: Format, source: str, rate: float | None, repe
             f"Plan for one of {', '.join(available_models())}, or export to {with_joints}"
         )
     read = motion_of_plan if source == "plan" else motion_of_replay
-    return read(loaded, rate or target.rate)
+    return read(loaded, target.rate if rate is None else rate)
 
 
 def export(

@@ -179,7 +179,7 @@ def motion_of_plan(plan: Plan, rate: float | None = None) -> Motion:
 
 
 def _motion_of_plan(plan: Plan, rate: float | None) -> Motion:
-    rate = _ensure_rate(rate or round(1 / float(plan.t[1]), 6))
+    rate = _ensure_rate(round(1 / float(plan.t[1]), 6) if rate is None else rate)
     planned = _planned(plan, _frames(plan.duration, rate))
     report = report_of(plan)
     try:
@@ -222,7 +222,7 @@ def _motion_of_replay(plan: Plan, rate: float | None) -> Motion:
     path = find_model(report.robot if report.robot else plan.robot.name)
     model = load_robot(path, plan.robot.gravity, payload_of(plan))
     index = indices(model, plan.foot_names)
-    rate = _ensure_rate(rate or round(1 / float(replay.t[1] - replay.t[0]), 6))
+    rate = _ensure_rate(round(1 / float(replay.t[1] - replay.t[0]), 6) if rate is None else rate)
     t = _frames(float(replay.t[-1]), rate)
     planned = _planned(plan, t)
     feet = replay.feet(t)
