@@ -12,7 +12,7 @@ Examples:
   warpgait export --list                                          every format, and what each is for
   warpgait export -- --help                                       all options of the Python package
 
-Formats: csv, json, parquet, amp, isaaclab, mjlab, locomujoco, lerobot, mujoco, mcap, usd. docs/exports.md has the conventions of each.
+Formats: csv, json, parquet, amp, isaaclab, mjlab, locomujoco, lerobot, mujoco, mcap, rosbag1, rosbag2, rerun, usd. docs/exports.md has the conventions of each.
 Python is that of .venv in the program's repository, or else python3. Nothing in the working folder is run.
 Exit codes: 0 written; 2 bad input, or a Python package is missing; 130 interrupted.";
 

@@ -110,6 +110,13 @@ def test_a_missing_package_is_named(plan: Path, monkeypatch: pytest.MonkeyPatch,
         assert not list(plan.parent.glob(f"walk{FORMATS[name].ending}*")) or name == "lerobot"
 
 
+def test_a_format_without_its_package_leaves_no_folder(plan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
+    assert main([str(plan), "--to", "rosbag2"]) == 2
+    assert [path.name for path in plan.parent.iterdir()] == [plan.name]
+    assert main([str(plan), "--to", "csv", "--rate", "0"]) == 2
+
+
 def test_what_is_there_is_replaced_only_by_the_rule_of_every_output(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = plan.with_name("walk.csv")
     target.write_text("old")

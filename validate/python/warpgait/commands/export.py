@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,13 +96,21 @@ def export(
     motion = motion_for(plan, target, source, rate, repeat)
     ground = output.with_name(f"{stem_of(plan)}{_GROUND}")
     outputs = [*target.outputs(output), *([] if target.ground else [ground])]
-    for folder in {path.parent for path in target.outputs(output) if target.files}:
+    folders = {path.parent for path in target.outputs(output) if target.files}
+    new = [folder for folder in folders if not folder.exists()]
+    for folder in folders:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{folder}: cannot make this folder ({error.strerror}); name another with --output") from error
     ensure_outputs(outputs, [plan])
-    target.write(motion, output)
+    try:
+        target.write(motion, output)
+    except InputError:
+        for folder in new:
+            with suppress(OSError):
+                folder.rmdir()  # it is empty
+        raise
     if not target.ground:
         write_heightfield(ground, motion.ground)
     return outputs, motion
