@@ -38,7 +38,7 @@ fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
         motion.interrupted |= half.interrupted;
         let enough = if half.solved { 0.5 * margin } else { 0.0 };
         motion.status = format!(
-            "{}; with contact.friction_margin = {enough} instead of {margin} a motion is found",
+            "{}; with contact.friction_margin = {enough} instead of {margin} the constraints can be met (the laws were not checked)",
             motion.status
         );
     }
