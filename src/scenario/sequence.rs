@@ -18,9 +18,9 @@ impl GaitSpec {
         self.sequence.clone().unwrap_or_else(|| vec![alone()])
     }
 
-    /// Whether all feet are in the air at times, by the kind of a section.
+    /// Whether all feet are in the air at times, by the kind of a section and its duty factor.
     pub fn flies(&self) -> bool {
-        self.sections().iter().any(|section| section.kind.flies())
+        self.sections().iter().any(|section| section.kind.flies_with(section.duty))
     }
 
     /// When each section ends, s.

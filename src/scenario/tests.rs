@@ -61,6 +61,15 @@ fn defaults_are_those_of_the_format() {
 }
 
 #[test]
+fn a_gait_with_flight_has_a_finer_time_step() {
+    let step = |gait: &str| parse("s.toml", &with("kind = \"trot\"", gait)).unwrap().time_step;
+    assert_eq!(step("kind = \"flying-trot\""), 0.025);
+    assert_eq!(step("kind = \"bound\"\nduty = 0.4"), 0.025);
+    assert_eq!(step("kind = \"bound\"\nduty = 0.5"), 0.05);
+    assert_eq!(step("kind = \"walk\"\nduty = 0.4"), 0.05);
+}
+
+#[test]
 fn the_template_is_a_scenario_of_defaults() {
     let scenario = parse("t.toml", &template("my\nname")).unwrap();
     assert_eq!(scenario.motion, MotionSpec::default());

@@ -16,9 +16,10 @@ import numpy as np
 from .arrays import Array, Bools, Integers
 from .footing import StepOver, TouchDown, swing_progress
 from .geometry import rotation_vector
-from .model import SAGITTAL, Indices
+from .model import SAGITTAL, Indices, composite, stand
 from .observer import Moment, Observer
 from .reference import Reference
+from .regulator import Body, Regulator
 from .trunk import TrunkForces
 
 FRICTION_IN_THE_AIR = 0.05  # friction coefficient that the controller relies on while a stance foot does not touch the ground yet
@@ -58,8 +59,8 @@ class Gains:
     The gains are those of accelerations, so that forces and torques follow the robot's inertia.
     """
 
-    com: tuple[float, float] = (100.0, 20.0)
-    rotation: tuple[float, float] = (100.0, 20.0)
+    trunk: tuple[float, float] = (100.0, 20.0)  # of center of mass and orientation, where the feet can correct an error at once
+    lever: float = 0.4  # m, by which rotations of the trunk are compared with displacements
     swing: tuple[float, float] = (1000.0, 52.0)
     stance_damping: float = 20.0
     reach_down: float = 0.01  # m below the plan, the target of a stance foot that does not touch the ground yet …
@@ -88,8 +89,8 @@ def gains_for(size: float) -> Gains:
 
     return replace(
         g,
-        com=pair(g.com),
-        rotation=pair(g.rotation),
+        trunk=pair(g.trunk),
+        lever=size * g.lever,
         swing=pair(g.swing),
         stance_damping=g.stance_damping / slower,
         reach_down=size * g.reach_down,
@@ -143,6 +144,11 @@ class WholeBody:
         self._moments: deque[Moment] = deque(maxlen=LATENCY + 1)
         self.observer = Observer(model, index, self._period)
         self._step_over = StepOver(reference, *self.gains.step_over)
+        stand(model, self._data)
+        stance = composite(model, self._data)
+        gravity, sagittal = float(np.linalg.norm(model.opt.gravity)), index.qvel.shape[1] == SAGITTAL
+        body = Body(stance.mass, stance.inertia, index.radius, gravity, self.gains.lever, sagittal)
+        self._regulator = Regulator(reference, body, *self.gains.trunk)
         self._touch_down = TouchDown(swing_progress(reference), float(reference.t[1]), *self.gains.seek)
 
     def torque(self, k: int, qpos: Array, qvel: Array, touching: Bools) -> Array:
@@ -197,9 +203,10 @@ class WholeBody:
         com = data.subtree_com[index.base]
         center = self.observer.locate(R, com - data.xpos[index.base])
         error, rate = ref.com[k] - com - center, ref.com_velocity[k] - jacobian @ v
-        self._b[:3] = ref.com_acceleration[k] + g.com[0] * error + g.com[1] * rate - drift
-        turn, spin = rotation_vector(R.T @ ref.rotation[k]), R.T @ ref.angular_velocity[k] - v[3:6]
-        self._b[3:6] = R.T @ ref.angular_acceleration[k] + g.rotation[0] * turn + g.rotation[1] * spin
+        turn, spin = R @ rotation_vector(R.T @ ref.rotation[k]), ref.angular_velocity[k] - R @ v[3:6]
+        back = self._regulator.acceleration(k, -np.r_[error, turn, rate, spin])
+        self._b[:3] = ref.com_acceleration[k] + back[:3] - drift
+        self._b[3:6] = R.T @ (ref.angular_acceleration[k] + back[3:])
         return [g.weight_com] * 3 + [g.weight_rotation] * 3
 
     def _foot_tasks(self, k: int, data: Any, touching: Bools) -> list[float]:
