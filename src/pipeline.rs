@@ -5,8 +5,10 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use nalgebra::Vector3;
+
 use crate::Result;
-use crate::check::{CheckReport, check};
+use crate::check::{self, CheckReport};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
 use crate::plan::Plan;
@@ -114,6 +116,7 @@ impl Prepared {
         }
         let surfaces = Surfaces::of(scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;
         let steps = Steps::of(scenario, &loaded.robot, &surfaces).map_err(|e| loaded.locate(e))?;
+        ensure_start(loaded, &surfaces, &steps.gait)?;
         if steps.gait != usual {
             let [more, fewer] = [&steps.gait, &usual].map(|gait| gait.swings.iter().map(Vec::len).max());
             let _ = observer(&Event::Note(&format!(
@@ -132,6 +135,16 @@ impl Prepared {
         let guess = loaded.guess.as_deref();
         Task { scenario, robot, steps: &self.steps, surfaces: &self.surfaces, guess, map }
     }
+}
+
+/// Refuses a given start that contradicts itself or the ground.
+fn ensure_start(loaded: &LoadedScenario, surfaces: &Surfaces, gait: &Gait) -> Result<()> {
+    let (scenario, robot) = (&loaded.scenario, &loaded.robot);
+    let nominal: Vec<Vector3<f64>> = robot.feet.iter().map(|foot| foot.nominal.into()).collect();
+    let pose = planner::given_pose(scenario, &nominal, robot.size(), surfaces);
+    let rows = std::array::from_fn(|i| std::array::from_fn(|j| pose.rotation[(i, j)]));
+    check::ensure_start(loaded, &surfaces.feet, pose.position.into(), rows)?;
+    planner::ensure_possible(loaded, gait, surfaces, &pose).map_err(|e| loaded.locate(e))
 }
 
 /// All that came out of a scenario.
@@ -194,7 +207,7 @@ pub fn run(
     let _ = observer(&Event::Step(Step::Plan));
     let provenance = Provenance { loaded, ground: &prepared.ground, map_seconds };
     let mut plan = Plan::from_motion(&motion, &provenance);
-    let check = check(&plan)?;
+    let check = check::check(&plan)?;
     plan.meta.checks = check.rows.clone();
     Ok(Some(Planned { prepared, map, plan, motion, check, derivatives }))
 }

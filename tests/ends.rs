@@ -180,6 +180,179 @@ fn starts_that_contradict_themselves_are_refused() {
     }
 }
 
+/// Why a start is refused before anything is solved.
+fn refusal(folder: &Path, text: &str) -> Option<String> {
+    let prepared = warpgait::scenario::load_text("s.toml", text, folder, &[])
+        .and_then(|loaded| Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).map(|_| ()));
+    prepared.err().map(|e| e.to_string())
+}
+
+#[test]
+fn a_plan_of_another_robot_or_on_other_ground_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    crate::common::standing().write(&folder.path().join("before.plan.npz")).expect("a file");
+    let text = |robot: &str, terrain: &str, more: &str| {
+        format!(
+            "formulation = \"direct\"\n[robot]\nname = \"{robot}\"\n[terrain]\n{terrain}\n[start]\nplan = \"before.plan.npz\"\n[goal]\nposition = [0.3, 0.0]\n{more}"
+        )
+    };
+    let flat = "kind = \"flat\"\nextent = [-2.0, 2.0, -1.0, 1.0]";
+    assert_eq!(refusal(folder.path(), &text("anymal_towr", flat, "")), None);
+    for (robot, terrain, more, words) in [
+        (
+            "solo12",
+            flat,
+            "",
+            "s.toml:8: start.plan: given \"before.plan.npz\", a plan for the robot anymal_towr, but here it is solo12 (robot.name, line 3)",
+        ),
+        (
+            "monoped_towr",
+            flat,
+            "",
+            "a plan for the robot anymal_towr, but here it is monoped_towr (robot.name, line 3)",
+        ),
+        (
+            "anymal_towr",
+            flat,
+            "[payload]\nmass = 2.0\n",
+            "a plan for anymal_towr of 29.5 kg, but here it has 31.5 kg (robot.name, line 3; payload.mass, line 12)",
+        ),
+        (
+            "anymal_towr",
+            "kind = \"formula\"\nexpression = \"0.05 * x\"",
+            "",
+            "s.toml:8: start.plan: sets start.state.feet[0]: given [0.34, 0.19, 0], where LF would stand 17 mm below the ground; plan on the same ground as that plan",
+        ),
+        (
+            "anymal_towr",
+            "kind = \"flat\"\nextent = [0.5, 2.0, -1.0, 1.0]",
+            "",
+            "s.toml:8: start.plan: sets start.position: given [0, 0], outside the terrain (terrain.extent, line 6)",
+        ),
+    ] {
+        let message = refusal(folder.path(), &text(robot, terrain, more)).expect(words);
+        assert!(message.contains(words) && !message.contains("--set"), "{message}");
+    }
+}
+
+#[test]
+fn a_state_that_fails_a_law_is_refused_before_solving() {
+    let feet = "[[0.34, 0.19, 0.0], [0.34, -0.19, 0.0], [-0.34, 0.19, 0.0], [-0.34, -0.19, 0.0]]";
+    let rest = "[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]";
+    let load = 29.5 * 9.81 / 4.0;
+    let forces = format!("[{}]", vec![format!("[0.0, 0.0, {load:?}]"); 4].join(", "));
+    let text = |state: &str, more: &str| {
+        format!(
+            "formulation = \"direct\"\nhorizon = 3.0\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\n[goal]\nposition = [0.3, 0.0]\n[start]\nposition = [0.0, 0.0]\n[start.state]\nheight = 0.42\n{state}\n{more}"
+        )
+    };
+    let lifted = |z: f64| format!("feet = {}", feet.replacen("0.19, 0.0", &format!("0.19, {z:?}"), 1));
+    let swing = "swings = [[0.1, 0.2], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]";
+    for sound in [
+        format!("feet = {feet}\nforces = {forces}"),
+        format!("{}\n{swing}", lifted(0.05)),
+        "velocity = [0.5, 0.0, 0.0]\nacceleration = [1.0, 0.0, 0.0]".to_owned(),
+    ] {
+        assert_eq!(refusal(".".as_ref(), &text(&sound, "")), None, "{sound}");
+    }
+    for (state, more, words) in [
+        (
+            lifted(0.03),
+            "",
+            "s.toml:13: start.state.feet[0]: given [0.34, 0.19, 0.03], where LF would stand 30 mm above the ground; put it on the ground, at z = 0.0000",
+        ),
+        (
+            lifted(-0.002),
+            "",
+            "start.state.feet[0]: given [0.34, 0.19, -0.002], where LF would stand 2 mm below the ground",
+        ),
+        (
+            format!("{}\n{swing}", lifted(-0.01)),
+            "",
+            "where LF, which is in the air (start.state.swings, line 14), would be 10.0 mm below the ground",
+        ),
+        (
+            format!("feet = {}", feet.replacen("0.34", "0.64", 1)),
+            "",
+            "start.state.feet[0]: given [0.64, 0.19, 0], 150 mm outside the reach box of LF, as the base is at [0, 0, 0.42] (start.position, line 10; start.state.height, line 12)",
+        ),
+        (
+            format!("feet = {feet}\nfeet_velocity = [[0.1, 0.0, 0.0], {rest}]"),
+            "",
+            "start.state.feet_velocity[0]: given [0.1, 0.0, 0.0] m/s for LF, which stands",
+        ),
+        (
+            format!("feet = {feet}\nforces = {}", forces.replacen(&format!("{load:?}"), "10.0", 1)),
+            "",
+            "start.state.forces: their sum is [0, 0, 227.046",
+        ),
+        (
+            format!("feet = {feet}\nforces = {}", forces.replace("[0.0, 0.0, ", "[60.0, 0.0, ")),
+            "",
+            "start.state.forces[0]: given [60, 0, 72.3488] N for LF, outside of its friction cone; allowed: 0.600 times the normal force",
+        ),
+        (
+            format!("feet = {feet}\nforces = {}", forces.replacen(&format!("{load:?}"), "-5.0", 1)),
+            "",
+            "which pulls on the ground",
+        ),
+        (
+            format!("{}\n{swing}\nforces = {forces}", lifted(0.05)),
+            "",
+            "start.state.forces[0]: given [0, 0, 72.3488] N for LF, which is in the air",
+        ),
+        (
+            format!("feet = {feet}\nangular_acceleration = [0.0, 20.0, 0.0]\nforces = {forces}"),
+            "",
+            "their torque about the center of mass is [0, 0, 0] N m, but the motion takes",
+        ),
+        (
+            "tilt = [0.2, 0.0]".to_owned(),
+            "[posture]\nroll = [-0.1, 0.1]",
+            "start.state.tilt: given a roll of 0.2 rad, outside [-0.1, 0.1] (posture.roll, line",
+        ),
+        (
+            format!("feet = {feet}"),
+            "[posture]\nheight = [0.45, 0.5]",
+            "start.state.height: the base is 0.420 m over the mean of the feet, outside [0.45, 0.5] (posture.height, line",
+        ),
+        (
+            String::new(),
+            "[motion]\nbase_clearance = 0.4",
+            "start.state.height: given 0.42 m, where the torso's underside is",
+        ),
+        (
+            "velocity = [15.0, 0.0, 0.0]".to_owned(),
+            "",
+            "start.state.velocity: given [15.0, 0.0, 0.0] m/s, so fast that LF is out of its reach before it lifts off",
+        ),
+        (
+            "acceleration = [50.0, 0.0, 0.0]".to_owned(),
+            "",
+            "start.state.acceleration: given [50.0, 0.0, 0.0] m/s², which takes a force outside of all friction cones (contact.friction, by default)",
+        ),
+        (
+            "acceleration = [0.0, 0.0, 150.0]".to_owned(),
+            "",
+            "which takes 16.3 m g from 4 feet; allowed: 2 m g of each (motion.force_limit, by default)",
+        ),
+        (
+            format!("{}\nswings = [[0.1, 0.004], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]", lifted(0.05)),
+            "",
+            "start.state.swings[0]: given [0.1, 0.004], but a plan has no sample before the foot lands; allowed: it lands after at least 0.005 s",
+        ),
+        (
+            format!("{}\nswings = [[0.05, 0.03], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]", lifted(0.05)),
+            "",
+            "start.state.swings[0]: given [0.05, 0.03], a swing of 0.08 s, which has no sample of the laws within it; allowed: at least 0.1 s, two time steps of 0.05 s",
+        ),
+    ] {
+        let message =
+            refusal(".".as_ref(), &text(&state, more)).unwrap_or_else(|| panic!("{state} {more}: {words}"));
+        assert!(message.starts_with("s.toml:") && message.contains(words), "{message}\nexpected: {words}");
+    }
+}
+
 #[test]
 fn a_goal_at_the_edge_is_refused_with_the_heading_of_arrival() {
     let text = "formulation = \"direct\"\n[robot]\nname = \"anymal_towr\"\n[terrain]\nkind = \"flat\"\nextent = [-1.0, 1.0, -1.0, 1.0]\n[start]\nposition = [0.0, 0.0]\n\

@@ -18,6 +18,7 @@ mod measured;
 mod motion;
 mod patches;
 mod splines;
+mod start;
 mod subject;
 mod terrain;
 mod vector;
@@ -27,6 +28,7 @@ use crate::Result;
 use crate::plan::{CheckRow, Plan};
 use crate::scenario;
 pub use laws::{CheckLimits, CheckedLaw, LAWS};
+pub use start::ensure_start;
 pub use subject::Residuals;
 use subject::Subject;
 

@@ -36,6 +36,8 @@ enum Origin {
     Line(usize),
     /// The argument of `--set`.
     Override(String),
+    /// The key from which the program derived the value.
+    Derived(String),
 }
 
 impl Document {
@@ -76,6 +78,18 @@ impl Document {
     /// # Errors
     /// If the argument is not of this form, or a part of the key is a value and not a table.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
+        self.assign(assignment, Some(Origin::Override(assignment.to_owned())))
+    }
+
+    /// Sets a value that follows from that of another key, at which errors then point; without one, a default.
+    ///
+    /// # Errors
+    /// Those of [`Self::set`].
+    pub fn derive(&mut self, assignment: &str, from: Option<&str>) -> Result<()> {
+        self.assign(assignment, from.map(|key| Origin::Derived(key.to_owned())))
+    }
+
+    fn assign(&mut self, assignment: &str, origin: Option<Origin>) -> Result<()> {
         let refuse = |why: String| Err(Error::input(format!("--set {assignment}: {why}")));
         let Some((key, value)) = assignment.split_once('=') else {
             return refuse("expected key=value, for instance gait.kind=trot".into());
@@ -110,11 +124,13 @@ impl Document {
             };
         }
         table.insert((*last).to_owned(), value);
-        let mut origins = &mut self.origins;
-        for part in parts {
-            origins = origins.entry(part);
+        if origin.is_some() {
+            let mut origins = &mut self.origins;
+            for part in parts {
+                origins = origins.entry(part);
+            }
+            *origins = Origins { here: origin, within: Vec::new() };
         }
-        *origins = Origins { here: Some(Origin::Override(assignment.to_owned())), within: Vec::new() };
         Ok(())
     }
 
@@ -158,6 +174,7 @@ impl Document {
         match self.origin(key) {
             (Some(Origin::Line(line)), true) => format!("{key}, line {line}"),
             (Some(Origin::Override(assignment)), true) => format!("--set {assignment}"),
+            (Some(Origin::Derived(from)), true) => format!("{key}, from {}", self.place(from)),
             _ => format!("{key}, by default"),
         }
     }
@@ -167,9 +184,18 @@ impl Document {
         let (file, line) = match self.origin(key).0 {
             Some(Origin::Line(line)) => (self.file.clone(), Some(*line)),
             Some(Origin::Override(assignment)) => (format!("--set {assignment}"), None),
+            Some(Origin::Derived(from)) => return self.error(from, format!("sets {key}: {what}")),
             None => (self.file.clone(), None),
         };
         Error::Value { file, line, key: key.to_owned(), what: what.to_string() }
+    }
+
+    /// The key from which the program derived a value, if it did.
+    pub fn derived_from(&self, key: &str) -> Option<&str> {
+        match self.origin(key).0 {
+            Some(Origin::Derived(from)) => Some(from),
+            _ => None,
+        }
     }
 
     /// Where the value at a key was set, or else the innermost of the tables and arrays around it; and whether there is a value.
@@ -183,7 +209,8 @@ impl Document {
             origin = inner.here.as_ref().or(origin);
             rest = rest[part.len()..].trim_start_matches('.');
         }
-        (origin, rest.is_empty())
+        // An element of an array that was set as a whole has the array's place.
+        (origin, rest.is_empty() || rest.starts_with('['))
     }
 }
 

@@ -182,7 +182,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
         scenario: loaded.effective_text.clone(),
         scenario_source: loaded.source_text.clone(),
         overrides: loaded.overrides.clone(),
-        robot: MetaRobot::of(model, loaded),
+        robot: MetaRobot::of(loaded),
         limits: Some(limits(scenario)),
         solver: MetaSolver {
             status: motion.status.clone(),
@@ -205,7 +205,7 @@ fn meta(motion: &Motion, provenance: &Provenance) -> Meta {
 
 impl MetaRobot {
     /// The robot of a scenario, as its plan names it.
-    pub fn of(model: &Model, loaded: &LoadedScenario) -> Self {
+    pub fn of(loaded: &LoadedScenario) -> Self {
         let robot = &loaded.robot;
         Self {
             name: robot.name.clone(),
@@ -213,7 +213,7 @@ impl MetaRobot {
             inertia: robot.inertia,
             friction: loaded.scenario.contact.friction,
             gravity: [0.0, 0.0, -GRAVITY],
-            reach: model.reach.clone(),
+            reach: robot.feet.iter().map(|foot| foot.reach).collect(),
             torso: robot.torso,
             foot_radius: robot.foot_radius(),
             legs: Self::legs_of(robot, &loaded.scenario),

@@ -83,12 +83,12 @@ impl<'a> BasePath<'a> {
         let way = Way::new(scenario, &model.surfaces.bends, model.size, feet);
         let standing = |[x, y, heading]: Place, height: Option<f64>| {
             let pose = standing_pose(&model.nominal, &model.surfaces.posture, [x, y], heading);
-            allowed(pose, model, &scenario.posture, height)
+            allowed(pose, &model.nominal, model.size, &scenario.posture, height)
         };
         let in_variables = |place: Place| pulled_back(&model.spaces.base, &standing(place, None));
         let [start, goal] = [way.at(0.0), way.at(way.length)];
         let pose = start::pose(scenario, standing(start, None));
-        ensure_reach(model, &pose, scenario.start.position)?;
+        ensure_reach(scenario, model, &pose)?;
         let first = pulled_back(&model.spaces.base, &pose)?;
         let unwound = |mut y: [f64; 6], heading: f64| {
             let expected = first[5] + heading - start[2];
@@ -272,7 +272,7 @@ impl<'a> BasePath<'a> {
         // Seen from above along the way, standing on the ground at every instant.
         let [x, y, heading] = self.way.at(u * self.length);
         let pose = standing_pose(&self.model.nominal, &self.model.surfaces.posture, [x, y], heading);
-        let pose = allowed(pose, self.model, &self.posture, None);
+        let pose = allowed(pose, &self.model.nominal, self.model.size, &self.posture, None);
         let angles = euler_angles(&pose.rotation);
         let expected = first[5] + heading - self.way.at(0.0)[2];
         [x, y, pose.position.z, angles.x, angles.y, expected + wrapped(angles.z - expected)]

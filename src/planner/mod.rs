@@ -14,6 +14,7 @@
 //! | `steps` | how many steps a motion takes over edges, and where |
 //! | `retiming` | when the guessed base is where, so that the feet reach their patches |
 //! | `travel` | whether the goal is within range at all |
+//! | `start`, `hurry` | the given state at the start; what no forces go with |
 //! | `legs` | what the legs' own mass adds to the laws, from a motion |
 //! | `leg_update` | the same from the iterates of a solve, while it runs |
 //! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
@@ -40,6 +41,7 @@ mod foothold_search;
 mod footholds;
 mod friction_margin;
 pub mod guess;
+mod hurry;
 pub mod iterate;
 mod leg_update;
 pub mod legs;
@@ -64,11 +66,13 @@ mod why;
 
 pub use elastic::{Explanation, Shortfall};
 pub use friction_margin::solve;
+pub use hurry::ensure_possible;
 pub use iterate::{Iterate, IterateSamples};
 pub use legs::{FINE, LegMotion};
 pub use motion::{Motion, Seconds};
 pub use problem::GaitProblem;
 pub use solve::{Host, Progress};
 pub use stage::Stage;
+pub use start::given_pose;
 pub use steps::Steps;
 pub use task::Task;

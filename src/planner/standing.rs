@@ -6,7 +6,7 @@ use crate::constraints::margins;
 use crate::constraints::posture::within;
 use crate::heightfield::Heightfield;
 use crate::nlp::Model;
-use crate::scenario::PostureSpec;
+use crate::scenario::{PostureSpec, Scenario};
 use crate::trajectory::rotation::{euler, euler_angles, project_to_rotation};
 use crate::trajectory::space::Space;
 use crate::warp::Order;
@@ -63,16 +63,22 @@ pub fn standing_pose(nominal: &[Vector3<f64>], ground: &Heightfield, xy: [f64; 2
 }
 
 /// A standing pose brought into the limits of a posture, and if one is given to a height over the feet, m.
-pub fn allowed(mut pose: Pose, model: &Model, posture: &PostureSpec, height: Option<f64>) -> Pose {
+pub fn allowed(
+    mut pose: Pose,
+    nominal: &[Vector3<f64>],
+    size: f64,
+    posture: &PostureSpec,
+    height: Option<f64>,
+) -> Pose {
     if *posture == PostureSpec::default() && height.is_none() {
         return pose;
     }
-    let own = -model.nominal.iter().map(|n| (pose.rotation * n).z).sum::<f64>() / model.feet() as f64;
+    let own = -nominal.iter().map(|n| (pose.rotation * n).z).sum::<f64>() / nominal.len() as f64;
     let clamped = |value: f64, range: Option<[f64; 2]>, margin: f64| {
         let range = range.map(|range| within(range, margin));
         range.map_or(value, |[least, greatest]| value.clamp(least, greatest))
     };
-    let wanted = clamped(height.unwrap_or(own), posture.height, model.size * margins::POSTURE_HEIGHT);
+    let wanted = clamped(height.unwrap_or(own), posture.height, size * margins::POSTURE_HEIGHT);
     pose.position.z += wanted - own;
     let mut angles = euler_angles(&pose.rotation);
     angles.x = clamped(angles.x, posture.roll, margins::POSTURE_TILT);
@@ -95,7 +101,14 @@ pub fn pulled_back(space: &Space, pose: &Pose) -> Result<[f64; 6]> {
 }
 
 /// Every foot must find ground within its box at the start.
-pub fn ensure_reach(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
+pub fn ensure_reach(scenario: &Scenario, model: &Model, pose: &Pose) -> Result<()> {
+    let start = &scenario.start;
+    let state = start.state.as_ref();
+    let (key, given) = match state.map_or((None, None), |state| (state.height, state.tilt)) {
+        (Some(height), _) => ("start.state.height", format!("{height} m")),
+        (None, Some(tilt)) => ("start.state.tilt", format!("{tilt:?}")),
+        (None, None) => ("start.position", format!("[{}, {}]", start.position[0], start.position[1])),
+    };
     for (i, reach) in model.reach.iter().enumerate() {
         let steps = 8;
         let mut nearest = f64::INFINITY;
@@ -114,13 +127,14 @@ pub fn ensure_reach(model: &Model, pose: &Pose, xy: [f64; 2]) -> Result<()> {
             }
         }
         if nearest > 1e-3 {
-            return Err(Error::input(format!(
-                "start.position = [{}, {}]: foot {} cannot reach the ground there, which is {:.0} mm outside its reach box; start on more even ground or change start.yaw",
-                xy[0],
-                xy[1],
-                model.foot_names[i],
-                nearest * 1e3
-            )));
+            return Err(Error::key(
+                key,
+                format!(
+                    "given {given}, where foot {} cannot reach the ground, which is {:.0} mm outside its reach box; start on more even ground, change start.yaw, or leave height and tilt out",
+                    model.foot_names[i],
+                    nearest * 1e3
+                ),
+            ));
         }
     }
     Ok(())

@@ -6,6 +6,7 @@ use super::standing::{Pose, allowed, pulled_back, standing_pose};
 use crate::nlp::model::GRAVITY;
 use crate::nlp::{Model, Start};
 use crate::scenario::{Scenario, StartState};
+use crate::terrain::Surfaces;
 use crate::trajectory::rotation::{euler, euler_angles};
 use crate::trajectory::space::Space;
 use crate::warp::Order;
@@ -22,6 +23,13 @@ pub fn pose(scenario: &Scenario, standing: Pose) -> Pose {
         pose.rotation = euler(&Vector3::new(roll, pitch, scenario.start_yaw())).rotation;
     }
     pose
+}
+
+/// The same where there is no model yet: at rest at the nominal places of the feet, base frame, m, for a robot of a size.
+pub fn given_pose(scenario: &Scenario, nominal: &[Vector3<f64>], size: f64, surfaces: &Surfaces) -> Pose {
+    let (place, yaw) = (scenario.start.position, scenario.start_yaw());
+    let standing = standing_pose(nominal, &surfaces.posture, place, yaw);
+    pose(scenario, allowed(standing, nominal, size, &scenario.posture, None))
 }
 
 /// Gives a model the state at the start and the velocity at the end, where the scenario has them.
@@ -45,9 +53,7 @@ pub fn set(scenario: &Scenario, model: &mut Model) -> Result<()> {
 /// Where a pose or a foothold has no preimage under the map.
 fn start(scenario: &Scenario, model: &Model) -> Result<Option<Start>> {
     let Some(state) = &scenario.start.state else { return Ok(None) };
-    let (place, yaw) = (scenario.start.position, scenario.start_yaw());
-    let standing = standing_pose(&model.nominal, &model.surfaces.posture, place, yaw);
-    let pose = pose(scenario, allowed(standing, model, &scenario.posture, None));
+    let pose = given_pose(scenario, &model.nominal, model.size, &model.surfaces);
     let mut base = [pulled_back(&model.spaces.base, &pose)?, [0.0; 6], [0.0; 6]];
     if scenario.start.moves() {
         let [first, second] = euler_rates(&pose, state);

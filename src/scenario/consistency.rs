@@ -1,7 +1,7 @@
 //! Refuses values that are allowed one by one but do not fit together, with file and line, before anything is computed.
 //!
-//! The schema has already checked keys, types and ranges. Only two kinds of refusal come later: what depends on the
-//! content of a terrain file, and the timing of the steps (`trajectory::Gait::new`).
+//! The schema has already checked keys, types and ranges. Three kinds of refusal come later: what depends on the content of a
+//! terrain file, the timing of the steps (`trajectory::Gait::of`), and a given start (`check::ensure_start`).
 
 use super::condition_checks;
 use super::cyclic;

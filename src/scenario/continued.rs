@@ -7,16 +7,75 @@ use crate::digest::sha256_hex;
 use crate::files;
 use crate::files::npz::NpzReader;
 use crate::input::Document;
+use crate::robot::Robot;
+use crate::visible::visible;
 use crate::{Error, Result};
 
-/// A file that was read: its name in the scenario and its SHA-256.
-type Input = (String, String);
+/// The plan that a motion goes on from.
+pub(super) struct Before {
+    /// Its name in the scenario and its SHA-256.
+    pub input: (String, String),
+    robot: String,
+    mass: f64,
+    feet: Vec<String>,
+}
 
-/// Reads what `start.plan` names, if anything, and sets the keys that follow. Returns the file.
+/// Masses of one robot may differ by this fraction.
+const SAME_MASS: f64 = 1e-9;
+
+impl Before {
+    fn read(npz: &mut NpzReader, input: (String, String)) -> Result<Self> {
+        let (_, feet) = npz.str("foot_names")?;
+        let (_, meta) = npz.str("meta")?;
+        let text = meta.first().map_or("", String::as_str);
+        let meta: serde_json::Value =
+            serde_json::from_str(text).map_err(|e| npz.error("meta", format!("not a JSON object: {e}")))?;
+        let robot = &meta["robot"];
+        match (robot["name"].as_str(), robot["mass"].as_f64()) {
+            (Some(name), Some(mass)) => Ok(Self { input, robot: name.to_owned(), mass, feet }),
+            _ => Err(npz.error("meta", "has no robot.name and robot.mass")),
+        }
+    }
+
+    /// Refuses a plan for another robot than this one, payload included.
+    pub fn ensure_robot(&self, document: &Document, robot: &Robot) -> Result<()> {
+        let key = if document.has("robot.file") { "robot.file" } else { "robot.name" };
+        let (place, theirs) = (document.place(key), visible(&self.robot));
+        let what = if self.robot != robot.name {
+            format!("a plan for the robot {theirs}, but here it is {} ({place})", robot.name)
+        } else if self.feet != robot.foot_names() {
+            let names = robot.foot_names().join(", ");
+            format!(
+                "a plan for {theirs} with the feet {}, but here they are {names} ({place})",
+                self.feet.iter().map(|name| visible(name)).collect::<Vec<_>>().join(", ")
+            )
+        } else if (self.mass - robot.mass).abs() > SAME_MASS * robot.mass {
+            format!(
+                "a plan for {theirs} of {} kg, but here it has {} kg ({place}{})",
+                self.mass,
+                robot.mass,
+                if document.has("payload") {
+                    format!("; {}", document.place("payload.mass"))
+                } else {
+                    String::new()
+                }
+            )
+        } else {
+            return Ok(());
+        };
+        let what = format!(
+            "given \"{}\", {what}; allowed: a plan for the same robot with the same payload",
+            self.input.0
+        );
+        Err(document.error("start.plan", what))
+    }
+}
+
+/// Reads what `start.plan` names, if anything, and sets the keys that follow.
 ///
 /// # Errors
 /// For a plan that cannot be read, and for keys that it would set.
-pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<Input>> {
+pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<Before>> {
     let start = document.table().get("start").and_then(toml::Value::as_table);
     let Some(name) = start.and_then(|start| start.get("plan")).and_then(toml::Value::as_str) else {
         if document.has("start.time") {
@@ -45,13 +104,15 @@ pub(super) fn expand(document: &mut Document, base_dir: &Path) -> Result<Option<
     let path = base_dir.join(&name);
     let located = |e: Error| document.error("start.plan", e);
     let digest = sha256_hex(files::read(&path, files::MAX_FILE).map_err(located)?);
-    let keys = keys(&path, time).map_err(|(key, e)| document.error(key, e))?;
+    let mut npz = NpzReader::open(&path).map_err(located)?;
+    let before = Before::read(&mut npz, (name, digest)).map_err(located)?;
+    let keys = keys(&mut npz, time).map_err(|(key, e)| document.error(key, e))?;
     for assignment in keys {
-        document.set(&assignment)?;
+        document.derive(&assignment, Some("start.plan"))?;
     }
     document.remove("start", "plan");
     document.remove("start", "time");
-    Ok(Some((name, digest)))
+    Ok(Some(before))
 }
 
 /// An integer or a float.
@@ -59,10 +120,12 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
 }
 
+/// The place of the base is rounded to so many parts of a meter.
+const ROUNDING: f64 = 1e12;
+
 /// `key=value` for each key that the plan sets; on failure, the key that is to blame.
-fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'static str, Error)> {
+fn keys(npz: &mut NpzReader, time: Option<f64>) -> std::result::Result<Vec<String>, (&'static str, Error)> {
     let plan = |e: Error| ("start.plan", e);
-    let mut npz = NpzReader::open(path).map_err(plan)?;
     let (_, t) = npz.finite_f64("t").map_err(plan)?;
     let (n, last) = (t.len(), t.last().copied().unwrap_or(0.0));
     if n < 2 || last <= 0.0 {
@@ -104,13 +167,18 @@ fn keys(path: &Path, time: Option<f64>) -> std::result::Result<Vec<String>, (&'s
     let in_air = if stands {
         Vec::new()
     } else {
-        let swings = swings(&mut npz, e, t[k]).map_err(plan)?;
+        let swings = swings(npz, e, t[k]).map_err(plan)?;
         // As the samples have it, where a switch is near.
         let of_foot = |foot: usize| if contact[k * e + foot] { [0.0; 2] } else { swings[foot] };
         let swings: Vec<[f64; 2]> = (0..e).map(of_foot).collect();
+        // Of feet in the air alone.
+        let of_foot = |foot: usize| if contact[k * e + foot] { [0.0; 3] } else { velocities[foot] };
+        let velocities: Vec<[f64; 3]> = (0..e).map(of_foot).collect();
         vec![format!("start.state.swings={swings:?}"), format!("start.state.feet_velocity={velocities:?}")]
     };
     let [roll, pitch, yaw] = angles(quaternion);
+    // Readable in messages: without rounding errors around zero.
+    let [x, y] = [x, y].map(|v| (v * ROUNDING).round() / ROUNDING + 0.0);
     let standing = vec![
         format!("start.position=[{x:?}, {y:?}]"),
         format!("start.yaw={yaw:?}"),

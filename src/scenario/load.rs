@@ -70,6 +70,16 @@ impl LoadedScenario {
         located(&self.document, error)
     }
 
+    /// Where a value was set, for messages about another one that contradicts it.
+    pub fn place(&self, key: &str) -> String {
+        self.document.place(key)
+    }
+
+    /// Whether the state at the start is where `start.plan` is left.
+    pub fn goes_on(&self) -> bool {
+        self.document.derived_from("start.position").is_some()
+    }
+
     /// Refuses a start or goal outside the ground.
     pub fn ensure_base_inside(&self, extent: [f64; 4]) -> Result<()> {
         consistency::inside(&self.document, &self.scenario, None, extent)
@@ -130,7 +140,7 @@ fn assemble(
     for assignment in overrides {
         document.set(assignment)?;
     }
-    let start_plan = continued::expand(&mut document, &base_dir)?;
+    let before = continued::expand(&mut document, &base_dir)?;
     let masks = mask::expand(&mut document, &base_dir)?;
     let scenario = read(&document)?;
     let robot = Robot::load(&scenario.robot, &base_dir).map_err(|e| located(&document, e))?;
@@ -142,11 +152,15 @@ fn assemble(
         }
         None => robot,
     };
+    if let Some(before) = &before {
+        before.ensure_robot(&document, &robot)?;
+    }
     let by_speed = set_by_speed(&mut document, &scenario, &robot)?;
     let by_gait = set_by_gait(&mut document, &scenario)?;
-    let changed = by_size || by_speed || by_gait || start_plan.is_some() || !masks.is_empty();
+    let changed = by_size || by_speed || by_gait || before.is_some() || !masks.is_empty();
     let scenario = if changed { read(&document)? } else { scenario };
     consistency::check(&document, &scenario, Some(&robot))?;
+    let start_plan = before.map(|before| before.input);
     let guess = given(&document, &scenario, &robot, &base_dir)?;
     let effective_text = match overrides {
         [] if !changed => source_text.clone(),
@@ -205,7 +219,7 @@ fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Resul
     for (key, default) in lengths.into_iter().chain(distance) {
         if size != 1.0 && !document.has(key) {
             let length = (1e4 * size * default).round() / 1e4;
-            document.set(&format!("{key}={length:?}"))?;
+            document.derive(&format!("{key}={length:?}"), None)?;
             found = true;
         }
     }
@@ -216,7 +230,7 @@ fn set_by_size(document: &mut Document, scenario: &Scenario, size: f64) -> Resul
 fn set_by_speed(document: &mut Document, scenario: &Scenario, robot: &Robot) -> Result<bool> {
     match way::horizon(scenario, robot) {
         Some(horizon) if !document.has("horizon") => {
-            document.set(&format!("horizon={horizon:?}"))?;
+            document.derive(&format!("horizon={horizon:?}"), Some("goal.speed"))?;
             Ok(true)
         }
         _ => Ok(false),
@@ -230,7 +244,7 @@ const FLIGHT_TIME_STEP: f64 = 0.025;
 fn set_by_gait(document: &mut Document, scenario: &Scenario) -> Result<bool> {
     let sets = scenario.gait.flies() && !document.has("time_step");
     if sets {
-        document.set(&format!("time_step={FLIGHT_TIME_STEP:?}"))?;
+        document.derive(&format!("time_step={FLIGHT_TIME_STEP:?}"), None)?;
     }
     Ok(sets)
 }

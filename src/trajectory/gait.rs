@@ -14,6 +14,8 @@ use crate::{Error, Result};
 const STAND: f64 = 0.3;
 /// The same on each side of the change from one gait to another.
 const CHANGE: f64 = 0.1;
+/// Tolerance for durations given in decimal, s.
+const ROUNDING: f64 = 1e-9;
 /// Lengths of a cycle that are tried besides the usual one, as fractions of it.
 const SHORTER_CYCLES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
 /// Below this duty factor, all feet of a trot, pace or bound are in the air at times. (A little less, because of rounding.)
@@ -128,8 +130,9 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
     let sections = gait.sections();
     let ends = gait.section_ends(scenario.horizon);
     // Feet in the air at the start land first.
-    let mut swings: Vec<Vec<Swing>> =
-        (0..robot.feet.len()).map(|foot| begun(scenario, foot).into_iter().collect()).collect();
+    let mut swings: Vec<Vec<Swing>> = (0..robot.feet.len())
+        .map(|foot| Ok(begun(scenario, foot)?.into_iter().collect()))
+        .collect::<Result<_>>()?;
     let landed = swings.iter().flatten().map(|s| s.end * scenario.time_step + CHANGE).fold(0.0, f64::max);
     for (n, section) in sections.iter().enumerate().filter(|(_, section)| section.kind.is_cyclic()) {
         let keyed = |e: Error| match e {
@@ -180,10 +183,37 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
 }
 
 /// The swing that a foot is in at the start, if the state there has it in the air.
-fn begun(scenario: &Scenario, foot: usize) -> Option<Swing> {
+fn begun(scenario: &Scenario, foot: usize) -> Result<Option<Swing>> {
+    let step = scenario.time_step;
+    let Some([since, left]) = scenario.start.swing(foot) else { return Ok(None) };
     // Rounding must not move a touch-down off the samples of plans, which are ten in a time step.
-    let [since, left] = scenario.start.swing(foot)?.map(|time| 10.0 * time / scenario.time_step);
-    Some(Swing::given(-0.1 * since, switches::snapped(left) / 10.0))
+    let samples = switches::snapped(10.0 * left / step);
+    let given = |why: String| {
+        Err(Error::key(format!("start.state.swings[{foot}]"), format!("given [{since}, {left}], {why}")))
+    };
+    if samples < 1.0 {
+        return given(format!(
+            "but a plan has no sample before the foot lands; allowed: it lands after at least {} s, a tenth of the time_step of {step} s",
+            shown(0.1 * step)
+        ));
+    }
+    if since + left < SHORTEST_PHASE * step - ROUNDING {
+        return given(format!("a swing of {} s, which {}", shown(since + left), too_short(step)));
+    }
+    Ok(Some(Swing::given(-since / step, samples / 10.0)))
+}
+
+/// What is wrong with a phase that is shorter than the shortest.
+fn too_short(step: f64) -> String {
+    format!(
+        "has no sample of the laws within it; allowed: at least {} s, two time steps of {step} s (time_step)",
+        shown(SHORTEST_PHASE * step)
+    )
+}
+
+/// A duration without rounding errors, s.
+fn shown(duration: f64) -> f64 {
+    (1e9 * duration).round() / 1e9
 }
 
 /// Phase tables: alternating stance and swing durations per foot, stance first and last; they fill the horizon. A first or last stance
@@ -214,15 +244,14 @@ fn custom(scenario: &Scenario, feet: usize, step: f64, intervals: usize) -> Resu
         for (j, pair) in edges.windows(2).enumerate() {
             let none = (j == 0 && in_air[0]) || (j + 1 == durations.len() && in_air[1]);
             if pair[1] < pair[0] + SHORTEST_PHASE && !none {
-                let what =
-                    format!("given {} s, which is shorter than two time steps of {step} s", durations[j]);
+                let what = format!("given {} s, which {}", durations[j], too_short(step));
                 return Err(Error::key(format!("{key}[{j}]"), what));
             }
         }
         let mut swings: Vec<Swing> =
             (1..durations.len()).step_by(2).map(|j| Swing::given(edges[j], edges[j + 1])).collect();
         if let Some(first) = swings.first_mut().filter(|_| in_air[0]) {
-            *first = begun(scenario, foot).unwrap_or(Swing::given(-first.end, first.end));
+            *first = begun(scenario, foot)?.unwrap_or(Swing::given(-first.end, first.end));
         }
         if let Some(last) = swings.last_mut().filter(|_| in_air[1]) {
             last.end += intervals as f64 - last.start;

@@ -77,7 +77,7 @@ impl Iterate {
         let (model, n, feet) = (point.model, found.t.len(), point.model.feet());
         let vectors = |values: &[[f64; 3]]| array(py, &[n], &[feet, 3], values.as_flattened().to_vec());
         let (base, warped) = (model.spaces.base.is_warped(), model.spaces.feet.is_warped());
-        let robot = serde_json::to_string(&MetaRobot::of(model, loaded));
+        let robot = serde_json::to_string(&MetaRobot::of(loaded));
         let when = |is: bool, values: &[[f64; 3]]| is.then(|| vectors(values)).transpose();
         Ok(Self {
             stage: at.stage.to_string(),
