@@ -116,6 +116,16 @@ def test_what_belongs_to_no_leg_is_held_still_and_said(dog: Path) -> None:
     assert found.base.mass == pytest.approx(7.5)
 
 
+def test_a_frame_with_a_mass_of_rounding_errors_has_none(tmp_path: Path) -> None:
+    """MuJoCo refuses such inertias; CAD programs export them for the frames of sensors."""
+    frame = """<link name="lidar"><inertial><mass value="4.2e-15"/>
+        <inertia ixx="1.7e-27" iyy="1.7e-27" izz="1.7e-27" ixy="-3e-45" ixz="8e-44" iyz="-9e-47"/></inertial></link>
+        <joint name="lidar_fixed" type="fixed"><parent link="trunk"/><child link="lidar"/></joint>"""
+    (tmp_path / "dog.urdf").write_text(URDF.replace("</robot>", frame + "</robot>"))
+    found = importer.read(tmp_path / "dog.urdf", importer.arguments([str(tmp_path / "dog.urdf")]))
+    assert found.base.mass == pytest.approx(7.5)
+
+
 MJCF = """<mujoco model="pup"><compiler angle="radian" autolimits="true"/><default><geom contype="1"/><joint range="-2.6 2.6"/></default>
 <worldbody><body name="trunk" pos="0 0 0.4"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="6"/>
 %s</body></worldbody><actuator>%s</actuator></mujoco>"""

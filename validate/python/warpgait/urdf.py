@@ -22,6 +22,7 @@ from .shapes import boxes_around, mesh_points
 LEAST_MASS = (
     1e-6  # kg: MuJoCo refuses a moving link with less; whether a link with all that is fixed to it has mass is judged later
 )
+NO_MASS = 1e-9  # kg: frames that were exported with a mass of rounding errors have none
 LIGHT = 0.02  # of the robot's mass: a link that is fixed to another and lighter may be a point mass
 MOMENT_ROUNDING = (
     0.01  # by how much a principal moment may exceed the sum of the other two, as a fraction: files have rounded numbers
@@ -169,7 +170,7 @@ def _inertial(path: Path, link: ET.Element, rigid: set[str], total: float, notes
     if inertial is None:
         return
     tensor = inertial.find("inertia")
-    if mass == 0:
+    if mass < NO_MASS:
         link.remove(inertial)
         return
     light = name in rigid and mass <= LIGHT * total
