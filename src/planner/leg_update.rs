@@ -13,7 +13,8 @@ use crate::scenario::Law;
 
 /// By how much the torque that the legs' mass adds may still change, rms and at most, m g · 1 m.
 const TOLERANCE: [f64; 2] = [0.0015 * LEVER, 0.005 * LEVER];
-/// Terms are updated at every third iterate. More often takes no fewer iterations, and computing them costs a third of one.
+/// Terms are updated at every third iterate until the cost has settled. More often takes no fewer iterations, and computing them costs a
+/// third of one.
 const EVERY: usize = 3;
 /// Terms that change by less than this fraction of the tolerance stay, so that the last iterations converge as fast as with fixed terms.
 const ENOUGH: f64 = 0.5;
@@ -69,10 +70,11 @@ impl LegUpdate {
         Self { law, iterates: 0, next: None }
     }
 
-    /// Looks at an iterate x, of which the state is.
-    pub fn observe(&mut self, model: &Model, state: &State, x: &[f64]) {
+    /// Looks at an iterate x, of which the state is. Once the cost has settled, steps are short, and terms of the last iterate are nearly
+    /// those of the next one.
+    pub fn observe(&mut self, model: &Model, state: &State, x: &[f64], settled: bool) {
         self.iterates += 1;
-        if !self.iterates.is_multiple_of(EVERY) {
+        if !settled && !self.iterates.is_multiple_of(EVERY) {
             return;
         }
         let Some(terms) = legs::terms(model, x, self.law) else { return };

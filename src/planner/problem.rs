@@ -31,6 +31,8 @@ use crate::scenario::{Cone, Law, PostureSpec, Scenario};
 use crate::trajectory::base::RATES;
 use crate::trajectory::variables::FootVariables;
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::bounds::{given_rows, variable_bounds};
@@ -53,6 +55,9 @@ const POSTURE_WEIGHT: f64 = 100.0;
 /// Weight of how standing feet share the load, relative to that of the forces' rate, in g over the standing height: the square of
 /// the rate at which a standing robot of that height falls over.
 const FORCE_SHARE_WEIGHT: f64 = 0.5;
+/// What the second derivatives get on the diagonal once the cost has settled. It leaves directions alone in which the cost hardly changes:
+/// steps along them, of a tenth of a unit, kept the violation from converging. 0.1 to 10 take as many iterations; more ends at larger costs.
+const DAMPING: f64 = 0.1;
 
 /// The nonlinear program min f(x) s.t. lower ≤ g(x) ≤ upper: Eq. 1 in the direct formulation, Eq. 7 in the warped one.
 pub struct GaitProblem {
@@ -72,6 +77,8 @@ pub struct GaitProblem {
     initial: Vec<f64>,
     /// Updates the terms of the legs' mass during a solve.
     pub leg_update: Option<LegUpdate>,
+    /// Whether the cost has settled (`planner/stopping.rs`): hardly more than feasibility is left to gain.
+    pub settled: Rc<Cell<bool>>,
     /// To start from, if there are any.
     pub multipliers: Option<Multipliers>,
     /// Rows that a given start leaves no variable of.
@@ -207,6 +214,7 @@ impl GaitProblem {
             hessian,
             initial,
             leg_update: None,
+            settled: Rc::default(),
             multipliers: None,
             lower,
             upper,
@@ -326,8 +334,13 @@ impl Terms<'_> {
     }
 }
 
+/// Adds [`DAMPING`] to the diagonal.
+fn damp(variables: usize, sink: &mut Sink) {
+    (0..variables).for_each(|v| sink.add(v, v, DAMPING));
+}
+
 /// The Hessian of the Lagrangian and its thread split: first all terms, while each thread accumulates the nodes' weights on its
-/// own; then, as further parts of the pattern, the nodes.
+/// own; then, as further parts of the pattern, the nodes. The last part is the damping.
 struct LagrangianHessian {
     pattern: Pattern,
     terms: ThreadSplit,
@@ -340,8 +353,9 @@ impl LagrangianHessian {
         let mut curvature = NodeCurvature::new(all.state);
         let terms = all.blocks.len() + all.costs.len();
         let parts = terms + NodeCurvature::PARTS;
-        let pattern = Pattern::record_parts(parts, |part, sink| match part.checked_sub(terms) {
+        let pattern = Pattern::record_parts(parts + 1, |part, sink| match part.checked_sub(terms) {
             None => all.hessian(part, &mut curvature, sink),
+            Some(NodeCurvature::PARTS) => damp(all.x.len(), sink),
             Some(node) => curvature.scatter(node, all.model, all.state, sink),
         });
         let threads = all.model.threads;
@@ -353,7 +367,7 @@ impl LagrangianHessian {
         }
     }
 
-    fn values(&mut self, all: &Terms, out: &mut [f64]) {
+    fn values(&mut self, all: &Terms, settled: bool, out: &mut [f64]) {
         let Self { pattern, terms, nodes, curvatures: [here, there] } = self;
         out.fill(0.0);
         here.clear();
@@ -372,6 +386,9 @@ impl LagrangianHessian {
         let first = all.blocks.len() + all.costs.len();
         let scatter = |part: usize, sink: &mut Sink| here.scatter(part - first, all.model, all.state, sink);
         nodes.add(pattern, out, scatter, scatter);
+        if settled {
+            pattern.add(&[first + NodeCurvature::PARTS], out, |_, sink| damp(all.x.len(), sink));
+        }
     }
 }
 
@@ -455,7 +472,7 @@ impl NlpProblem for GaitProblem {
         self.update(x, true);
         // Ipopt asks for second derivatives once at every iterate, and in its restoration phase without the objective.
         if let Some(leg_update) = self.leg_update.as_mut().filter(|_| objective_factor != 0.0) {
-            leg_update.observe(&self.model, &self.state, x);
+            leg_update.observe(&self.model, &self.state, x, self.settled.get());
         }
         if let Some(hessian) = &mut self.hessian {
             let terms = Terms {
@@ -468,7 +485,7 @@ impl NlpProblem for GaitProblem {
                 factor: objective_factor,
                 multipliers,
             };
-            hessian.values(&terms, out);
+            hessian.values(&terms, self.settled.get(), out);
         }
     }
 }

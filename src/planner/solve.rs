@@ -358,7 +358,8 @@ impl<'a> Solve<'a> {
         }
 
         let rule_effort = if matches!(stage, Stage::LegMass { .. }) { Effort::Feasible } else { effort };
-        let mut rule = StoppingRule::new(rule_effort, with_costs, tolerance);
+        let mut rule =
+            StoppingRule::new(rule_effort, with_costs, tolerance).telling(&problem, problem.settled.clone());
         let mut stopped = false;
         let (history, host, model) = (&mut self.history, &mut *self.host, problem.model.clone());
         let (before, seconds_before) = (self.iterations, self.start.elapsed().as_secs_f64());
