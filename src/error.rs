@@ -28,7 +28,7 @@ pub enum Error {
         what: String,
     },
     /// A file could not be read or written. Exit code 2.
-    #[error("{path}: {source}")]
+    #[error("{path}: {}", in_words(source))]
     Io {
         /// The file.
         path: String,
@@ -57,5 +57,14 @@ impl Error {
     /// An I/O error at a path.
     pub fn io(path: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
         Error::Io { path: path.as_ref().display().to_string(), source }
+    }
+}
+
+/// What the operating system reported, without its number of the error.
+fn in_words(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    match text.rfind(" (os error ") {
+        Some(at) => text[..at].to_owned(),
+        None => text,
     }
 }

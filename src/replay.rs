@@ -13,6 +13,8 @@ const HAS_PACKAGE: &str = "import importlib.util, sys; \
 
 /// The environment variable that names a Python to use.
 const PYTHON_VARIABLE: &str = "WARPGAIT_PYTHON";
+/// The environment variable with the process whose end is the end of the one that it is given to: see `warpgait.children` in Python.
+const PARENT_VARIABLE: &str = "WARPGAIT_PARENT";
 
 /// How many folders above the program are searched for its repository: for `target/release/warpgait`, this reaches it.
 const FOLDERS_ABOVE: usize = 4;
@@ -49,10 +51,11 @@ pub fn python() -> Result<PathBuf> {
     })
 }
 
-/// Runs this Python's package, isolated from the working folder: that is not searched for modules, whatever `PYTHONPATH` says.
+/// Runs this Python's package, isolated from the working folder: that is not searched for modules, whatever `PYTHONPATH` says. It ends with
+/// this process, even if that is killed; the thread that starts it must wait for it.
 pub fn command(python: &Path) -> Command {
     let mut command = Command::new(python);
-    command.arg("-P");
+    command.arg("-P").env(PARENT_VARIABLE, std::process::id().to_string());
     if let Some(path) = std::env::var_os("PYTHONPATH") {
         // To Python, an empty entry is the working folder.
         match std::env::join_paths(std::env::split_paths(&path).filter(|folder| folder.is_absolute())) {

@@ -231,6 +231,11 @@ fn validate_runs_python() {
     let (_, out, _) = validate(&["view", "a.plan.npz", "--html", "a.html"]);
     assert_eq!(out.trim(), "-P -m warpgait.commands.view a.plan.npz --html a.html");
 
+    // It is told which process it ends with.
+    script(&python, "[ \"$2\" = -c ] && echo found && exit 0\n[ $WARPGAIT_PARENT = $PPID ] && echo mine");
+    let (_, out, _) = validate(&["validate", "a.plan.npz"]);
+    assert_eq!(out.trim(), "mine");
+
     // A Python that crashes is neither "not trackable" nor an interruption.
     script(&python, "[ \"$2\" = -c ] && echo found && exit 0\nkill -s SEGV $$");
     let (code, _, err) = validate(&["validate", "a.plan.npz"]);

@@ -157,6 +157,12 @@ fn files_that_do_not_fit_are_refused_with_their_line() {
     }
     std::fs::write(folder.path().join("m.csv"), &good).unwrap();
     load_text("s.toml", &text, folder.path(), &[]).expect("the file itself is good");
+    // As a spreadsheet writes it.
+    let quoted = header.split(',').map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",");
+    let from_spreadsheet: Vec<&str> = std::iter::once(&*quoted).chain(good.lines().skip(2)).collect();
+    let content = format!("\u{feff}{}", from_spreadsheet.join("\r\n"));
+    std::fs::write(folder.path().join("m.csv"), content).unwrap();
+    load_text("s.toml", &text, folder.path(), &[]).expect("a byte order mark and quotes");
     let plan = text.replace("m.csv", "other.plan.npz");
     let mut motion = crate::common::standing();
     motion.foot_names[2] = "LM".into();

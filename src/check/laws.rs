@@ -145,8 +145,28 @@ laws! {
     LEAST_CLEARANCE = "base_clearance_least", "mm", None, None, "least distance of the torso's underside from the ground";
 }
 
-/// Limits that are for robots as tall as ANYmal: torques and lengths are compared with the robot's height.
-const BY_HEIGHT: [&CheckedLaw; 4] = [EULER_RMS, EULER_MAX, MOMENTUM, GROUND_MOVED];
+/// Limits that are for robots as tall as ANYmal: torques and lengths are compared with the robot's height. The allowances for rounding and
+/// sampling, and for what a sample tells of a derivative, are the same for all robots.
+const BY_HEIGHT: [&CheckedLaw; 16] = [
+    EULER_RMS,
+    EULER_MAX,
+    SHIFT,
+    MOMENTUM,
+    STANCE_GAP,
+    REACH,
+    PATCH,
+    GROUND_MOVED,
+    START,
+    START_STATE,
+    CYCLE,
+    GOAL,
+    WAYPOINT,
+    HEIGHT,
+    POSTURE_HEIGHT,
+    FIXED_FOOTHOLD,
+];
+/// Speeds, which are compared with √(g h).
+const BY_SPEED: [&CheckedLaw; 2] = [START_FEET, CYCLE_MOTION];
 /// Limits that are for ANYmal's feet: the ground under a foot is compared with the foot.
 const BY_FOOT: [&CheckedLaw; 2] = [PATCH_ROUGHNESS, PATCH_OFFSET];
 /// Standing height and radius of the feet for which they are, m.
@@ -156,9 +176,15 @@ const ANYMAL_FOOT: f64 = 0.03;
 /// Which part of a law's default limit holds for a robot. It is smaller for smaller robots, and not larger for larger ones.
 fn part(law: &CheckedLaw, robot: &MetaRobot) -> f64 {
     let is_in = |laws: &[&CheckedLaw]| laws.iter().any(|known| known.name == law.name);
-    let part = if is_in(&BY_HEIGHT) && !robot.nominal.is_empty() {
-        let height = -robot.nominal.iter().map(|foot| foot[2]).sum::<f64>() / robot.nominal.len() as f64;
-        height / ANYMAL_HEIGHT
+    let height = || {
+        // Plans of version 0.1.0 and before do not have it.
+        let sum: f64 = robot.nominal.iter().map(|foot| -foot[2]).sum();
+        if robot.nominal.is_empty() { 1.0 } else { sum / (robot.nominal.len() as f64 * ANYMAL_HEIGHT) }
+    };
+    let part = if is_in(&BY_HEIGHT) {
+        height()
+    } else if is_in(&BY_SPEED) {
+        height().max(0.0).sqrt()
     } else if is_in(&BY_FOOT) {
         robot.foot_radius / ANYMAL_FOOT
     } else {
@@ -207,5 +233,38 @@ impl CheckLimits {
         let strict = if self.strict { law.strict } else { None };
         let usual = strict.or(law.limit).map(|limit| part(law, robot) * limit);
         self.changed.get(law.name).copied().or(usual)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::load_text;
+
+    fn limit(robot: &str, law: &CheckedLaw) -> f64 {
+        let text = format!(
+            "[robot]\nname = \"{robot}\"\n[terrain]\nkind = \"flat\"\n[start]\nposition = [0.0, 0.0]\n[goal]\nposition = [0.2, 0.0]\n"
+        );
+        let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+        CheckLimits::default().of(law, &MetaRobot::of(&loaded)).expect("a limit")
+    }
+
+    #[test]
+    fn lengths_and_speeds_go_by_the_height_of_smaller_robots() {
+        let height = 0.1904 / ANYMAL_HEIGHT;
+        for (law, part) in [
+            (STANCE_GAP, height),
+            (REACH, height),
+            (START_FEET, height.sqrt()),
+            (FOOT_JUMP, 1.0),
+            (SWING_PENETRATION, 1.0),
+            (NEWTON_MAX, 1.0),
+        ] {
+            let usual = law.limit.expect("a limit");
+            assert!((limit("solo12", law) - part * usual).abs() < 1e-9, "{}", law.name);
+            for robot in ["anymal_b", "anymal_c", "anymal_towr", "b1", "hyq"] {
+                assert_eq!(limit(robot, law), usual, "{robot}: {}", law.name);
+            }
+        }
     }
 }

@@ -21,7 +21,7 @@ use crate::{Error, Result};
 const SLOPES: i32 = 12;
 /// What the check allows of Newton's law, m g.
 const NEWTON: f64 = 0.03;
-/// What the estimate leaves, m.
+/// What the estimate leaves, m, for a robot of ANYmal's size.
 const SLACK: f64 = 0.02;
 
 /// Refuses what no forces go with.
@@ -100,6 +100,7 @@ fn velocity(loaded: &LoadedScenario, state: &StartState, gait: &Gait, start: &Po
         return Ok(());
     }
     let ahead = velocity.xy() / speed;
+    let slack = SLACK * loaded.robot.size();
     for (e, foot) in loaded.robot.feet.iter().enumerate().filter(|(e, _)| !scenario.in_air(*e)[0]) {
         let lift_off =
             gait.swings[e].first().map_or(gait.intervals as f64, |swing| swing.start + swing.room[0]);
@@ -122,7 +123,7 @@ fn velocity(loaded: &LoadedScenario, state: &StartState, gait: &Gait, start: &Po
         let excess = |fraction: f64| {
             let rate = fraction * (speed + grip * velocity.z);
             let t = (rate / (grip * GRAVITY)).clamp(0.0, until);
-            begins + rate * t - grip * (0.5 * GRAVITY * t * t + r) - r - SLACK
+            begins + rate * t - grip * (0.5 * GRAVITY * t * t + r) - r - slack
         };
         if excess(1.0) <= 0.0 {
             continue;

@@ -55,9 +55,9 @@ pub(super) fn check(document: &Document, scenario: &Scenario) -> Result<()> {
     if (cycles - cycles.round()).abs() > MISSED || cycles < 0.5 {
         let whole = cycles.round().max(1.0);
         let what = format!(
-            "given {cycle} s, of which {cycles:.3} fit into {} of {} s, but {because}; allowed: a whole number, such as with {} s, or a horizon of {} s",
+            "given {cycle} s, of which {cycles:.3} fit into the {} s of the motion ({}), but {because}; allowed: a whole number, such as with {} s, or a horizon of {} s",
+            rounded(scenario.horizon),
             document.place("horizon"),
-            scenario.horizon,
             rounded(scenario.horizon / whole),
             rounded(whole * cycle)
         );
@@ -89,7 +89,7 @@ mod tests {
             (
                 "cycle = 0.8",
                 "",
-                "s.toml:11: gait.cycle: given 0.8 s, of which 2.500 fit into horizon, line 1 of 2 s, but the motion is cyclic (gait.periodic, line 9); allowed: a whole number, such as with 0.6667 s, or a horizon of 2.4 s",
+                "s.toml:11: gait.cycle: given 0.8 s, of which 2.500 fit into the 2 s of the motion (horizon, line 1), but the motion is cyclic (gait.periodic, line 9); allowed: a whole number, such as with 0.6667 s, or a horizon of 2.4 s",
             ),
             (
                 "optimize_durations = true",

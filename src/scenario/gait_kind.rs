@@ -62,7 +62,8 @@ impl GaitKind {
 
     /// The same with the duty factor that is given: two groups of feet that stand for less than half of the cycle each leave gaps.
     pub fn flies_with(self, duty: Option<f64>) -> bool {
-        self.flies() || matches!(self, Self::Trot | Self::Pace | Self::Bound) && duty.is_some_and(|duty| duty < 0.5)
+        self.flies()
+            || matches!(self, Self::Trot | Self::Pace | Self::Bound) && duty.is_some_and(|duty| duty < 0.5)
     }
 }
 

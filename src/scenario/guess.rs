@@ -118,7 +118,13 @@ struct Table<'a> {
 impl<'a> Table<'a> {
     fn new(path: &Path, text: &'a str) -> Result<Self> {
         let file = path.display().to_string();
-        let cells = |line: &'a str| line.split(',').map(str::trim).collect::<Vec<_>>();
+        // Spreadsheets begin a text with a byte order mark, and put cells in quotes.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let unquoted = |cell: &'a str| {
+            let cell = cell.trim();
+            cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
+        };
+        let cells = |line: &'a str| line.split(',').map(unquoted).collect::<Vec<_>>();
         let mut lines =
             (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
         let Some((header_line, header)) = lines.next() else {

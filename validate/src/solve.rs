@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyStopIteration};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use warpgait::pipeline::{self, Event};
@@ -22,7 +22,8 @@ const BETWEEN: Duration = Duration::from_millis(100);
 /// `scenario` is a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
 /// `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
 /// iteration of the nonlinear program, and `watch(iterate)` at most ten times a second with an `Iterate`, the motion so far. An exception that
-/// they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A
+/// they raise ends the solve and is raised here, and so is Ctrl-C; after `StopIteration`, the motion so far is returned, with its check.
+/// Other threads run meanwhile. One solve runs at a time in a process. A
 /// solve that does not converge is not an error: see `solved` and `passed`.
 #[pyfunction]
 #[pyo3(signature = (scenario, *, overrides = None, progress = None, watch = None))]
@@ -51,6 +52,9 @@ pub fn solve(
         outcome.and_then(|outcome| outcome.map(|outcome| Trajectory::new(outcome.plan)).transpose())
     });
     match (raised, outcome) {
+        (Some(raised), Ok(Some(trajectory))) if raised.is_instance_of::<PyStopIteration>(py) => {
+            Ok(trajectory)
+        }
         (Some(raised), _) => Err(raised),
         (None, Err(error)) => Err(exception(error)),
         (None, Ok(Some(trajectory))) => Ok(trajectory),

@@ -100,7 +100,7 @@ def test_bad_values_are_refused_with_their_key(tmp_path: Path) -> None:
         Scenario(start=object())  # type: ignore[arg-type]
     with pytest.raises(InputError, match="either a name or a file"):
         Scenario(robot=Robot())
-    with pytest.raises(InputError, match="cannot be read as a scenario"):
+    with pytest.raises(InputError, match="there is no such file"):
         Scenario.read(tmp_path / "none.toml")
     with pytest.raises(InputError, match="not TOML"):
         Scenario.from_text("a = = 1").to_dict()

@@ -84,6 +84,14 @@ def test_errors_give_exit_code_2_and_a_report_that_says_so(
     ):
         assert main([str(walk_plan), *wrong]) == 2
         assert wrong[0] in capsys.readouterr().err
+    for words, said_of_it in (
+        (["--repeat", "1.5"], '--repeat: given "1.5", allowed: a whole number'),
+        (["--rate", "fast"], '--rate: given "fast", allowed: a number'),
+        (["--quik"], "unrecognized arguments: --quik; warpgait validate -- --help lists all options"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([str(walk_plan), *words])
+        assert ended.value.code == 2 and capsys.readouterr().err == f"error: {said_of_it}\n"
     assert sorted(walk_plan.parent.iterdir()) == before  # a report of an earlier run stays
 
 

@@ -159,7 +159,7 @@ BAD: list[tuple[str, str]] = [
     ("[values]\nhorizon = [1.0]\n", "scenario: expected the name"),
     ('scenario = "walk.toml"\n', "values: expected a table"),
     ('scenario = "walk.toml"\n[values]\n', "values: expected a table"),
-    ('scenario = "none.toml"\n[values]\nhorizon = [1.0]\n', "none.toml: cannot be read as a scenario"),
+    ('scenario = "none.toml"\n[values]\nhorizon = [1.0]\n', "none.toml: there is no such file"),
     ('scenario = "walk.toml"\nworkers = 2\n[values]\nhorizon = [1.0]\n', "workers: unknown key; allowed here: scenario"),
     ('scenario = "walk.toml"\nkind = "all"\n[values]\nhorizon = [1.0]\n', "kind: 'all': expected grid or random"),
     ('scenario = "walk.toml"\nkind = "random"\n[values]\nhorizon = [1.0]\n', "count: is missing"),

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 
+from .children import end_with_parent
 from .errors import InputError
 from .text import visible
 
@@ -62,7 +63,8 @@ def keep_standard_streams() -> None:
 
 
 def run(main: Callable[[], int]) -> int:
-    """Run a command; returns its exit code, or 2 if its output cannot be written."""
+    """Run a command; returns its exit code, or 2 if its output cannot be written. It ends with the program that started it."""
+    end_with_parent()
     keep_standard_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):

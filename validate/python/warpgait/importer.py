@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 from . import stance as stances
+from .arguments import Parser
 from .arrays import Array
 from .assemble import Imported, assemble, assemble_freest
 from .console import ERROR, complain, emit, run
@@ -280,7 +281,7 @@ def _numbers(text: str) -> list[float]:
 
 def arguments(words: list[str] | None) -> argparse.Namespace:
     """The options of the command."""
-    parser = argparse.ArgumentParser(prog="warpgait robot import", description="From a URDF or MJCF to NAME.toml and NAME.xml.")
+    parser = Parser(prog="warpgait robot import", description="From a URDF or MJCF to NAME.toml and NAME.xml.")
     parser.add_argument("file", type=Path, help="a .urdf, or an .xml of MuJoCo")
     parser.add_argument(
         "-o", "--output", type=Path, help="DIR/NAME of the two files (default: the name of FILE, in the working folder)"

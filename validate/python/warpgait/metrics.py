@@ -26,9 +26,9 @@ OPEN_LOOP, ROBUST = "open loop", "robust"  # layers
 FORCE_WINDOW = 0.02  # s: forces are averaged over this time, so that an impact of 2 ms does not hide the rest
 LANDING = 0.003  # m, for a robot of ANYmal's size: a foot this close to where it lands or lifts off may touch the ground
 PATIENCE = 0.05  # s: a wrong contact or a saturated motor is an incident after this time
-SLIP_INCIDENT = 0.02  # m of slip in one stance
+SLIP_INCIDENT = 0.02  # m of slip in one stance, for a robot of ANYmal's size
 SATURATED = 0.98  # fraction of the torque limit from which a motor counts as being at its limit
-LEAST_SPREAD = 1.0  # N, standard deviation below which a force is constant and a correlation means nothing
+LEAST_SPREAD = 0.002  # of m g, standard deviation below which a force is constant and a correlation means nothing
 
 
 def _rms(vectors: Any) -> float:
@@ -125,11 +125,10 @@ class FilteredForces:
         """(K, E, 3) N."""
         return self.simulated - self.planned
 
-    @property
-    def vertical_correlation(self) -> float:
-        """Correlation of the vertical forces; 1 if one of them is constant."""
+    def vertical_correlation(self, weight: float) -> float:
+        """Correlation of the vertical forces; 1 if one of them is constant. `weight` is m g, N."""
         both = np.stack([self.simulated[..., 2].ravel(), self.planned[..., 2].ravel()])
-        return float(np.asarray(np.corrcoef(both))[0, 1]) if both.std(1).min() > LEAST_SPREAD else 1.0
+        return float(np.asarray(np.corrcoef(both))[0, 1]) if both.std(1).min() > LEAST_SPREAD * weight else 1.0
 
 
 def filtered_forces(replay: Replay, reference: Reference) -> FilteredForces:
@@ -238,12 +237,12 @@ def judge_closed_loop(
         _worst(t, torque * velocity / index.power_limit, feet).metric(layer, criteria.REPLAY_POWER),
         _worst(t, off_feet, feet).metric(layer, criteria.FOOT_FORCES, float(np.sqrt((off_feet**2).sum(1).mean()))),
         _worst(t, off_net).metric(layer, criteria.NET_FORCE, float(np.sqrt((off_net**2).mean()))),
-        _worst(t, off_feet, feet).metric(layer, criteria.FORCE_CORRELATION, forces.vertical_correlation),
+        _worst(t, off_feet, feet).metric(layer, criteria.FORCE_CORRELATION, forces.vertical_correlation(mg)),
     ]
     metrics = [replace(m, criterion=m.criterion.for_size(index.size)) for m in metrics]
     incidents = _incidents_of(replay)
     incidents += _incidents_by_foot(layer, replay, planned, saturated.any(-1), index)
-    incidents += _incidents_of_tracking(layer, t, com, turn, off_net)
+    incidents += _incidents_of_tracking(layer, t, com, turn, off_net, index.size)
     return metrics, incidents
 
 
@@ -262,19 +261,19 @@ def _incidents_by_foot(layer: str, replay: Replay, planned: Bools, saturated: An
         result: Bools = since_start(flags, ones) >= samples
         return result
 
-    time = f"for {1e3 * PATIENCE:g} ms"
+    time, slip = f"for {1e3 * PATIENCE:g} ms", SLIP_INCIDENT * index.size
     found = (
         (lasting(planned & ~replay.contact), f"no contact {time} where contact is planned"),
         (lasting(replay.contact & ~planned), f"contact {time} where a swing is planned"),
-        (since_start(planned, replay.slip) > SLIP_INCIDENT, f"slips by {1e3 * SLIP_INCIDENT:g} mm in one stance"),
+        (since_start(planned, replay.slip) > slip, f"slips by {1e3 * slip:g} mm in one stance"),
         (lasting(saturated), f"a motor at its limit {time}"),
     )
     return _first_by_foot(layer, replay.t, index.feet, found)
 
 
-def _incidents_of_tracking(layer: str, t: Array, com: Array, turn: Array, net: Array) -> list[Incident]:
+def _incidents_of_tracking(layer: str, t: Array, com: Array, turn: Array, net: Array, size: float) -> list[Incident]:
     """Where errors of center of mass (K,) m, rotation (K,) degrees and net force (K,) m g first exceed a limit for marginal."""
-    com_limit, turn_limit = criteria.COM_MAX.marginal / 1e3, criteria.ROTATION_MAX.marginal
+    com_limit, turn_limit = criteria.COM_MAX.for_size(size).marginal / 1e3, criteria.ROTATION_MAX.marginal
     net_limit = criteria.NET_FORCE.marginal
     incidents = []
     for errors, limit, what in (

@@ -20,7 +20,7 @@ from .rolling import Rolling, no_rolling, roll
 POSTURE_ITERATIONS = (
     3  # for the base's origin: each moves it an eighth as far as the one before; a fourth would move it by 0.2 mm
 )
-TOUCH_DEPTH = 1e-3  # m: a part that is less deep in the ground only touches it
+TOUCH_DEPTH = 1e-3  # m, for a robot of ANYmal's size: a part that is less deep in the ground only touches it
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def parts_in_ground(world: Any, index: Indices, qpos: Array) -> list[tuple[int, 
         for contact in range(data.ncon):
             pair = data.contact.geom[contact]
             other = int(pair[1] if pair[0] == ground else pair[0])
-            if other not in feet and data.contact.dist[contact] < -TOUCH_DEPTH:
+            if other not in feet and data.contact.dist[contact] < -TOUCH_DEPTH * index.size:
                 found.append((k, world.body(world.geom_bodyid[other]).name))
                 break
     return found

@@ -78,7 +78,7 @@ def _plots(v: Validation, trial: Trial) -> list[str]:
     distances = [Line(t, apart[:, e], f"foot{e % _COLORS}", foot) for e, foot in feet]
     parts = [
         contact_bars(v.index.feet, t, ref.contact[:K], r.contact, end),
-        chart("Center of mass: distance from plan", "mm", com, _limits(criteria.COM_MAX), end),
+        chart("Center of mass: distance from plan", "mm", com, _limits(criteria.COM_MAX.for_size(v.index.size)), end),
         chart("Trunk orientation: angle from plan", "°", turn, _limits(criteria.ROTATION_MAX), end),
         chart("Feet: distance from plan", "mm", distances, (), end),
     ]

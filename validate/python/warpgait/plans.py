@@ -318,7 +318,8 @@ def solve(
     `scenario` is a `Scenario`, a file, or the text of one: a `str` with a line break (its relative paths are relative to the working folder).
     `overrides` sets values by dotted key, `{"gait.kind": "trot"}`. `progress(iteration, violation, objective)` is called at every
     iteration of the nonlinear program, and `watch(iterate)` at most ten times a second with an `Iterate`, the motion so far. An exception that
-    they raise ends the solve and is raised here, and so is Ctrl-C. Other threads run meanwhile. One solve runs at a time in a process. A
+    they raise ends the solve and is raised here, and so is Ctrl-C; after `StopIteration`, the motion so far is returned, with its check.
+    Other threads run meanwhile. One solve runs at a time in a process. A
     solve that does not converge is not an error: see `solved` and `passed`. `guess` is a plan, or the file of a motion, to start from, as
     `guess.file` names it.
     """

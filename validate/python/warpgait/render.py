@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Array
+from .children import end_with_parent
 from .files import replacing, write_bytes
 
 Image = npt.NDArray[np.uint8]
@@ -123,4 +124,5 @@ def main(job_text: str) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     main(sys.argv[1])

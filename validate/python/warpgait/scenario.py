@@ -81,8 +81,11 @@ class Scenario:
             with file.open("rb") as opened:
                 content = opened.read(_MOST_TEXT + 1)
             text = content.decode()
+        except FileNotFoundError as error:
+            raise InputError(f"{file}: there is no such file") from error
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{file}: cannot be read as a scenario: {error}") from error
+            why = error.strerror if isinstance(error, OSError) else error
+            raise InputError(f"{file}: cannot be read as a scenario: {why}") from error
         if len(content) > _MOST_TEXT:
             raise InputError(f"{file}: too large for a scenario")
         made = cls.from_text(text)

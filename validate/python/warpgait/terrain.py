@@ -7,13 +7,13 @@ reads a `grid_map_msgs/GridMap` from a bag of ROS 1, a bag of ROS 2 or an MCAP f
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from .arguments import Parser
 from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import ensure_outputs
@@ -88,7 +88,7 @@ def convert(recording: Path, topic: str, layer: str, number: int, output: Path) 
 
 def main(words: list[str] | None = None) -> int:
     """Convert; returns 0, or 2 on bad input."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m warpgait.terrain",
         description="Write a layer of a grid_map in a ROS bag or an MCAP file as a ground for scenarios.",
     )

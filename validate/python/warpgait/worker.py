@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .children import end_with_parent
 from .closedloop import ClosedLoop, robot_of, world_of
 from .metrics import ROBUST
 from .settings import Disturbance
@@ -20,6 +21,7 @@ from .settings import Disturbance
 
 def main() -> int:
     """Serve until standard input ends."""
+    end_with_parent()
     # What libraries print must not get between the answers.
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)

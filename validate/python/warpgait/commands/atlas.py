@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..arguments import Parser
 from ..console import INTERRUPTED, answer, emit, run
 from ..scenario import Scenario
 from ..surface import Terrain
@@ -22,10 +23,8 @@ from ..text import visible
 from .overrides import assigned
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="warpgait atlas", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> Parser:
+    parser = Parser(prog="warpgait atlas", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("ground", type=Path, help="a file of heights (image, array, grid or mesh), or a scenario (.toml)")
     parser.add_argument("--robot", metavar="NAME", help="the robot (default: that of the scenario)")
     parser.add_argument("--spacing", type=float, metavar="M", help="of a file of heights: distance between neighboring cells, m")

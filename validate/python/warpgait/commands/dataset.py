@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..arguments import Parser
 from ..console import INTERRUPTED, answer, emit, run
 from ..sweeps.dataset import dataset
 from ..sweeps.spec import Case
@@ -20,10 +21,8 @@ from ..text import visible
 from .overrides import assigned
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="warpgait dataset", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> Parser:
+    parser = Parser(prog="warpgait dataset", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the data set")
     parser.add_argument("--robot", metavar="NAME", default="anymal_c", help="the robot (default %(default)s)")
     parser.add_argument("--count", type=int, default=10, metavar="N", help="motions (default %(default)s)")

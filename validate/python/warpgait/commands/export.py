@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arguments import Parser
 from ..console import answer, emit, run
 from ..errors import InputError
 from ..files import ensure_outputs, stem_of
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 _GROUND = ".ground.npz"
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="warpgait export", description="Writes the motion of a plan in the format of a trainer, a robot or a viewer."
     )
     parser.add_argument("plan", type=Path, nargs="?", help="NAME.plan.npz")

@@ -1,4 +1,7 @@
-"""`warpgait view --live S.toml`: plans a scenario, and shows the iterates in the browser as they come; then the page of the plan."""
+"""`warpgait view --live S.toml`: plans a scenario, and shows the iterates in the browser as they come; then the page of the plan.
+
+Ctrl-C writes the motion so far, once there is one, as `warpgait solve` does; a second one ends the command.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import sys
 import threading
 from pathlib import Path
 
-from ..console import emit
+from ..console import INTERRUPTED, emit
 from ..errors import InputError
 from ..files import ensure_outputs, stem_of, write_text
 from ..plans import Plan, Watch
@@ -17,11 +20,7 @@ from ..text import visible
 from .overrides import assigned
 
 _AFTER = 0.3  # s after the last page was sent, for other windows that show it
-_LAST_WORDS = 0.2  # s for a solve that is to stop
-
-
-class _StoppedError(Exception):
-    """The user has stopped the solve."""
+_LAST_WORDS = 0.2  # s for a solve that has not begun
 
 
 class _Solve:
@@ -31,29 +30,30 @@ class _Solve:
         self._scenario, self._watch = scenario, watch
         self.plan: Plan | None = None
         self.error: BaseException | None = None
-        self.stopped = threading.Event()
-        self.thread = threading.Thread(target=self._run, daemon=True)
-        self.thread.start()
+        self.stopped, self._begun, self._done = threading.Event(), threading.Event(), threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
 
     def _progress(self, *_: float) -> None:
+        self._begun.set()
         if self.stopped.is_set():
-            raise _StoppedError
+            raise StopIteration
 
     def _run(self) -> None:
         try:
             self.plan = self._scenario.solve(self._progress, self._watch)
         except BaseException as error:
             self.error = error
+        self._done.set()
 
     def result(self) -> Plan:
-        """Wait for the plan; Ctrl-C stops the solve."""
+        """Wait for the plan; Ctrl-C stops the solve, and the plan is then that of the motion so far, if there is one."""
         try:
-            while self.thread.is_alive():
-                self.thread.join(0.1)
+            self._done.wait()
         except KeyboardInterrupt:
             self.stopped.set()
-            self.thread.join(_LAST_WORDS)
-            raise
+            if not self._begun.wait(_LAST_WORDS):
+                raise
+            self._done.wait()
         if self.error is not None:
             raise self.error
         assert self.plan is not None
@@ -81,7 +81,8 @@ def live(options: argparse.Namespace) -> tuple[int, dict[str, object]]:
         if not options.quiet:
             words = "shows the solve" if shown else "shows the solve: open it in a browser"
             print(f"view: {server.address} {words}; Ctrl-C ends it", file=sys.stderr)
-        plan = _Solve(scenario, lambda at: server.show(*iterates.shown(at))).result()
+        solve = _Solve(scenario, lambda at: server.show(*iterates.shown(at)))
+        plan = solve.result()
         plan.save(output)
         page = page_of(output)
         write_text(target, page)
@@ -90,6 +91,9 @@ def live(options: argparse.Namespace) -> tuple[int, dict[str, object]]:
             emit(visible(output))
             emit(visible(target))
         server.show(lambda: page, {"scene": 0}, last=True)
+        if solve.stopped.is_set():
+            print("view: interrupted; the motion so far is written", file=sys.stderr)
+            return INTERRUPTED, written
         try:
             server.shown.wait()
             threading.Event().wait(_AFTER)

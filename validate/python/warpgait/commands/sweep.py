@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..arguments import Parser
 from ..console import INTERRUPTED, answer, emit, run
 from ..errors import InputError
 from ..sweeps import spec
@@ -19,8 +20,8 @@ from ..sweeps.run import run as run_sweep
 from ..text import visible
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="warpgait sweep",
         description="Plans many scenarios that differ in some values, here or on a cluster, and resumes where it was interrupted.",
         epilog=spec.__doc__,

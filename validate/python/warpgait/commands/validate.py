@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arguments import Parser
 from ..console import ERROR, INTERRUPTED, OutputError, complain, emit, run
 from ..errors import InputError, error_page, error_report
 from ..files import ensure_outputs, stem_of, write_text
@@ -48,12 +49,10 @@ def _numbers(count: int, what: str) -> type[argparse.Action]:
     return Numbers
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> Parser:
     """The command line. Defaults are those of `Settings` and `Disturbance`."""
     settings, disturbance = Settings(), Disturbance()
-    parser = argparse.ArgumentParser(
-        prog="warpgait validate", description="Replays a plan on the full robot in MuJoCo and judges it."
-    )
+    parser = Parser(prog="warpgait validate", description="Replays a plan on the full robot in MuJoCo and judges it.")
     parser.add_argument("plan", type=Path, help="NAME.plan.npz")
     parser.add_argument("-o", "--output", type=Path, help="folder for the reports (default: the plan's folder)")
     parser.add_argument("--model", help="replay on this robot (a name in robots/, or an .xml file) instead of the plan's robot")

@@ -14,6 +14,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from ..arguments import Parser
 from ..console import answer, emit, run
 from ..errors import InputError
 from ..files import ensure_outputs, stem_of, write_text
@@ -23,8 +24,8 @@ from ..text import visible
 _DISPLAYS = "DISPLAY", "WAYLAND_DISPLAY"  # without one of them, there is no browser to open on Linux
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="warpgait view",
         description="Writes a page of a plan, and of its replay if that lies beside it, and opens it in the browser.",
     )

@@ -7,7 +7,6 @@ has its limits of time and memory, and harms no other.
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import resource
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from .. import _native  # noqa: F401 (loaded before the forks)
+from ..children import end_with
 from ..errors import InputError
 from ..files import stem_of
 from ..plans import Plan
@@ -30,7 +30,6 @@ from ..settings import without_opengl
 SOLVED, FAILED, REFUSED, TIMED_OUT, KILLED = "solved", "failed", "refused", "timed out", "killed"
 _SPARE_SECONDS = 10.0  # of processor time beyond the limit, which is enforced by the clock
 _GRACE = 2.0  # s between asking a process to end and ending it
-_END_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 _PATH_POINTS = 24  # of the picture of a motion
 
 
@@ -129,10 +128,7 @@ def _prepare(order: dict[str, Any]) -> None:
 
 def _child(order: dict[str, Any], output: int, errors: IO[bytes], parent: int) -> None:
     """Plan in this process, and write the result."""
-    with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_END_WITH_PARENT, signal.SIGKILL)
-    if os.getppid() != parent:
-        return
+    end_with(parent)
     os.dup2(os.open(os.devnull, os.O_RDWR), 0)
     os.dup2(0, 1)
     os.dup2(errors.fileno(), 2)
