@@ -235,9 +235,11 @@ impl Robot {
         self.largest(|leg| leg.foot_radius).unwrap_or(TYPICAL_FOOT * self.standing_height())
     }
 
-    /// Radius of the largest knee, m, as for the feet.
+    /// Radius of the largest knee, m, as for the feet; upper joints count as well.
     pub fn knee_radius(&self) -> f64 {
-        self.largest(|leg| leg.knee_radius).unwrap_or(2.0 * TYPICAL_FOOT * self.standing_height())
+        let upper = |leg: &LegSpec| leg.joints.iter().filter_map(|joint| joint.radius).fold(0.0, f64::max);
+        self.largest(|leg| leg.knee_radius.max(upper(leg)))
+            .unwrap_or(2.0 * TYPICAL_FOOT * self.standing_height())
     }
 
     /// The largest of a length of the legs; none if it is zero, or no leg is described.
@@ -435,11 +437,11 @@ mod tests {
         assert!(robot.is_sagittal() && !changed_in(SHIPPED[2].1, "LF", "LF").unwrap().is_sagittal());
         for foot in &robot.feet {
             let leg = foot.leg().unwrap();
-            let chain = leg.chain.unwrap();
+            let chain = leg.chain.as_ref().unwrap();
             let [thigh, knee] = foot.leg.as_ref().unwrap().stance.clone().unwrap()[..] else { panic!() };
             for turn in [0.0, 0.2, -0.2] {
                 let q = [0.0, thigh + turn, knee - 0.5 * turn];
-                let contact = Vector3::from(chain.foot::<f64>(q)) - Vector3::z() * leg.foot_radius;
+                let contact = Vector3::from(chain.foot::<f64>(&q)) - Vector3::z() * leg.foot_radius;
                 assert!((contact.y - foot.nominal[1]).abs() < 1e-4, "in its plane");
                 let posture = leg.posture::<f64>(contact.into());
                 for (found, expected) in posture.joint_angles().into_iter().zip(q) {
@@ -469,7 +471,7 @@ mod tests {
         for r in [[0.389, 0.240, -0.429], [0.25, 0.1, -0.4], [0.5, 0.3, -0.35]] {
             let parts = |leg: &Leg| {
                 let posture = leg.posture::<f64>(r);
-                posture.swing_angles().chain(posture.on_shank([0.1, 0.05])).collect::<Vec<_>>()
+                posture.swing_angles().into_iter().chain(posture.on_shank([0.1, 0.05])).collect::<Vec<_>>()
             };
             let [old, new] = [parts(&old), parts(&new)];
             for (a, b) in old.iter().zip(&new) {

@@ -11,6 +11,8 @@ use warpgait::scenario::{Formulation, Scenario};
 use warpgait::terrain::Surfaces;
 use warpgait::warp::WarpMap;
 
+use crate::common::chains;
+
 /// Largest relative error allowed; the step of the differences is 1e-5, their own error some 1e-9.
 const TOLERANCE: f64 = 1e-6;
 
@@ -290,6 +292,25 @@ fn blocks_of_legs_of_two_joints_match_differences() {
             assert!(problem.blocks().any(has), "{name}");
         }
         check(problem, &format!("solo8, {formulation}"));
+    }
+}
+
+/// Legs of four to seven joints, all of whose joints have rows, and upper links that keep clear of the ground.
+#[test]
+fn blocks_of_legs_of_many_joints_match_differences() {
+    for (counts, (name, terrain)) in
+        [([4; 4], TERRAINS[0]), ([3, 4, 5, 6], TERRAINS[2]), ([7; 4], TERRAINS[4])]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let file = chains::robot(folder.path(), counts);
+        for formulation in ["warped", "direct", "hybrid"] {
+            let problem = problem_of(file.to_str().unwrap(), terrain, formulation, "");
+            for name in ["joint speed", "joint torque", "knee clearance"] {
+                let has = |(block, _): (&dyn Constraint, usize)| block.name() == name && block.rows() > 0;
+                assert!(problem.blocks().any(has), "{name}");
+            }
+            check(problem, &format!("{counts:?}, {name}, {formulation}"));
+        }
     }
 }
 

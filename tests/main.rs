@@ -4,6 +4,7 @@
 
 mod architecture;
 mod bench;
+mod chains;
 mod check;
 mod claims;
 mod cli;

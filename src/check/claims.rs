@@ -89,9 +89,9 @@ fn magnitude(plan: &Plan) -> f64 {
     let warped_base = plan.warped.iter().flat_map(|w| &w.base).flat_map(|b| [&b.position, &b.euler]);
     let map = plan.map.iter().map(|map| &map.control_points);
     let joints = plan.legs.iter().flat_map(|legs| &legs.joints).flat_map(|j| [&j.position, &j.torque]);
-    let legs = legs.chain(joints);
     let points = base.into_iter().chain(feet).chain(legs).chain(warped).chain(warped_base).chain(map);
-    let numbers = plan.phase_durations.iter().chain(plan.splines.iter().map(|(.., values)| values));
+    let splines = plan.splines.iter().map(|(.., values)| values);
+    let numbers = plan.phase_durations.iter().chain(splines).chain(joints);
     let ground = [Some(&plan.ground.height), plan.ground.raw.as_ref()];
     points
         .flatten()

@@ -14,8 +14,6 @@ use super::legs::{BodyMotion, spin};
 use super::subject::{Finding, Subject, Worst};
 use super::vector::{add, apply, cross, dot, product, scale, sub};
 
-const JOINTS: usize = 3;
-
 pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     let Some(body) = &s.body else { return };
     let stated = s.plan.legs.as_ref().and_then(|legs| legs.joints.as_ref());
@@ -23,9 +21,9 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
     let (mut range, mut speed, mut greatest) = (Worst::default(), Worst::default(), Worst::default());
     for (n, e) in s.sample_feet() {
         let at = n * s.feet + e;
-        let (angles, torques) = (body.angles[at], motor_torques(s, body, n, e));
+        let (angles, torques) = (&body.angles[at], motor_torques(s, body, n, e));
         let joints = &s.robot.legs[e].joints;
-        for (joint, j) in joints.iter().zip(JOINTS - joints.len()..) {
+        for (joint, j) in joints.iter().zip(angles.len() - joints.len()..) {
             let [least, most] = joint.range;
             let beyond = (least - angles[j]).max(angles[j] - most).max(0.0);
             range.meet(if angles[j].is_nan() { f64::NAN } else { 1e3 * beyond }, n, Some(e));
@@ -35,8 +33,9 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
             }
             greatest.meet(100.0 * torques[j].abs() / joint.torque_limit, n, Some(e));
             if let Some(stated) = stated {
-                position.meet(1e3 * (stated.position[at][j] - angles[j]).abs(), n, Some(e));
-                let off = (stated.torque[at][j] - torques[j]).abs();
+                let place = (at + 1) * stated.joints - angles.len() + j;
+                position.meet(1e3 * (stated.position[place] - angles[j]).abs(), n, Some(e));
+                let off = (stated.torque[place] - torques[j]).abs();
                 torque.meet(100.0 * off / joint.torque_limit, n, Some(e));
             }
         }
@@ -52,7 +51,7 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) {
 }
 
 /// N m.
-fn motor_torques(s: &Subject, body: &BodyMotion, n: usize, e: usize) -> [f64; JOINTS] {
+fn motor_torques(s: &Subject, body: &BodyMotion, n: usize, e: usize) -> Vec<f64> {
     let last = s.samples - 1;
     let place = |n: usize, point: [f64; 3]| {
         add(s.plan.base_position[n], apply(&body.turns[n], sub(point, body.shift[n])))
@@ -63,8 +62,8 @@ fn motor_torques(s: &Subject, body: &BodyMotion, n: usize, e: usize) -> [f64; JO
         add(add(s.foot_force(before, e), scale(4.0, s.foot_force(n, e))), s.foot_force(after, e)),
     );
     // Of each link: where it is, the force on it, and the rate of its spin.
-    let loads: [_; JOINTS] = std::array::from_fn(|j| {
-        let l = 1 + JOINTS * e + j;
+    let joints = body.angles[n * s.feet + e].len();
+    let load = |l: usize| {
         let link = &body.links[n][l];
         let here = place(n, link.center);
         let (mut acceleration, mut rate) = (scale(-1.0, s.robot.gravity), [0.0; 3]);
@@ -78,14 +77,16 @@ fn motor_torques(s: &Subject, body: &BodyMotion, n: usize, e: usize) -> [f64; JO
             rate = scale(1.0 / s.step, sub(spins[1], spins[0]));
         }
         (here, scale(link.mass, acceleration), rate)
-    });
-    std::array::from_fn(|j| {
-        let (point, axis) = body.axes[n][JOINTS * e + j];
+    };
+    let loads: Vec<_> = (0..joints).map(|j| load(body.first_link[e] + j)).collect();
+    let torque = |j: usize| {
+        let (point, axis) = body.axes[n][body.first_link[e] - 1 + j];
         let origin = place(n, point);
         let borne = loads[j..].iter().fold([0.0; 3], |sum, (place, force, rate)| {
             add(add(sum, cross(sub(*place, origin), *force)), *rate)
         });
         let by_ground = cross(sub(s.foot_position(n, e), origin), force);
         dot(apply(&body.turns[n], axis), sub(borne, by_ground))
-    })
+    };
+    (0..joints).map(torque).collect()
 }

@@ -2,17 +2,32 @@
 //!
 //! The base's position is the center of mass of all of them, so the trunk is where the legs leave it: its point that is the center of
 //! mass at the nominal stance is at p − R s. The shift s depends on the postures of the legs, and these on s.
+//!
+//! Of all joint angles of a leg that put its foot at c, those are taken that are nearest to the nominal stance q̄:
+//!
+//! ```text
+//!   min ½ Σ wᵢ (qᵢ − q̄ᵢ)²  subject to  F(q) = c,   wᵢ = 1/hᵢ²
+//! ```
+//!
+//! with hᵢ half the range of joint i. A leg of three joints has only one posture near the one before.
 
 use super::vector::{
-    Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, sub, transposed, turn_between,
+    Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, solve, sub, transposed,
+    turn_between,
 };
 use crate::leg::LegSpec;
 use crate::plan::{MetaRobot, Plan};
 
+/// Joints that a leg may have.
+const MOST_JOINTS: usize = 7;
 /// Joint angles are found when they put the foot this near to its place, m.
 const FOUND: f64 = 1e-9;
 /// Steps of Newton's method at most; one sample is near the one before it.
 const STEPS: usize = 30;
+/// rad: a leg of more than three joints is at its least distance from the stance when a step is smaller.
+const AT_LEAST: f64 = 1e-7;
+/// Least and greatest hᵢ, rad.
+const HALF_RANGE: [f64; 2] = [0.3, std::f64::consts::PI];
 /// Rounds for s, each of which leaves about an eighth of the error, and the change at which they end, m.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 1e-9;
@@ -21,6 +36,10 @@ const SETTLED: f64 = 1e-9;
 struct Joint {
     position: [f64; 3],
     axis: [f64; 3],
+    /// q̄, rad.
+    stance: f64,
+    /// w, 1/rad².
+    weight: f64,
     mass: f64,
     center: [f64; 3],
     inertia: Turn,
@@ -59,9 +78,11 @@ pub(super) struct BodyMotion {
     /// (N − 1,) the angular momentum about the center of mass halfway between samples, world frame, kg m²/s.
     pub momentum: Vec<[f64; 3]>,
     /// (N·E,) the joint angles of the legs, rad.
-    pub angles: Vec<[f64; 3]>,
+    pub angles: Vec<Vec<f64>>,
     /// By sample, the trunk and then the links leg by leg.
     pub links: Vec<Vec<Placed>>,
+    /// By leg: the number of its first link among `links`, where the trunk is the first; one less among `axes`.
+    pub first_link: Vec<usize>,
     /// By sample, leg by leg.
     pub axes: Vec<Vec<Axis>>,
     /// (N,) the orientation of the trunk.
@@ -70,11 +91,15 @@ pub(super) struct BodyMotion {
 
 impl Leg {
     fn new(spec: &LegSpec) -> Option<Self> {
-        let joints = spec.joints.iter().map(|joint| {
+        let stance = spec.stance.as_ref().filter(|stance| stance.len() == spec.joints.len())?;
+        let joints = spec.joints.iter().zip(stance).map(|(joint, stance)| {
             let [xx, yy, zz, xy, xz, yz] = joint.inertia;
+            let half = (0.5 * (joint.range[1] - joint.range[0])).clamp(HALF_RANGE[0], HALF_RANGE[1]);
             Joint {
                 position: joint.position,
                 axis: scale(1.0 / norm(joint.axis), joint.axis),
+                stance: *stance,
+                weight: half.powi(-2),
                 mass: joint.mass,
                 center: joint.center,
                 inertia: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]],
@@ -86,6 +111,8 @@ impl Leg {
             let abduction = Joint {
                 position: first.position,
                 axis: [1.0, 0.0, 0.0],
+                stance: 0.0,
+                weight: 1.0,
                 mass: 0.0,
                 center: [0.0; 3],
                 inertia: [[0.0; 3]; 3],
@@ -97,7 +124,7 @@ impl Leg {
     }
 
     /// At the joint angles q.
-    fn place(&self, q: &[f64; 3]) -> PlacedLeg {
+    fn place(&self, q: &[f64]) -> PlacedLeg {
         let mut turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut at = [0.0; 3];
         let (mut links, mut axes) = (Vec::new(), Vec::new());
@@ -112,36 +139,48 @@ impl Leg {
         PlacedLeg { links, axes, foot }
     }
 
-    /// Newton's method from the angles q: whether they reach the center of the foot at `target`.
-    fn solve(&self, target: [f64; 3], q: &mut [f64; 3]) -> bool {
+    /// The joint angles of the nominal stance, rad; zero for the joint about x that a leg of two joints lacks.
+    fn stance(&self) -> Vec<f64> {
+        self.joints.iter().map(|joint| joint.stance).collect()
+    }
+
+    /// Newton's method from the angles q: whether they reach the center of the foot at `target`. The unknowns are q and the multipliers λ
+    /// of
+    ///
+    /// ```text
+    ///   W (q − q̄) + (∂F/∂q)ᵀ λ = 0,   F(q) = c
+    /// ```
+    fn solve(&self, target: [f64; 3], q: &mut [f64]) -> bool {
+        let n = q.len();
+        let mut lambda = [0.0; 3];
+        let mut last = if n > 3 { f64::INFINITY } else { 0.0 };
         for _ in 0..STEPS {
             let PlacedLeg { axes, foot, .. } = self.place(q);
             let miss = sub(target, foot);
-            if norm(miss) < FOUND {
+            if norm(miss) < FOUND && last < AT_LEAST {
                 return true;
             }
             let columns: Vec<[f64; 3]> = axes.iter().map(|(at, axis)| cross(*axis, sub(foot, *at))).collect();
-            // Cramer's rule.
-            let determinant = dot(columns[0], cross(columns[1], columns[2]));
-            let step = [
-                dot(miss, cross(columns[1], columns[2])),
-                dot(columns[0], cross(miss, columns[2])),
-                dot(columns[0], cross(columns[1], miss)),
-            ]
-            .map(|part| part / determinant);
-            let most = step.iter().fold(1.0, |most: f64, s| most.max(s.abs() / 0.3));
-            *q = std::array::from_fn(|j| q[j] + step[j] / most);
+            let mut rows = vec![vec![0.0; n + 3]; n + 3];
+            let mut right = vec![0.0; n + 3];
+            for (i, joint) in self.joints.iter().enumerate() {
+                for j in 0..n {
+                    // ∂²F/∂qᵢ∂qⱼ = aᵢ × ∂F/∂qⱼ for i ≤ j.
+                    rows[i][j] = dot(cross(axes[i.min(j)].1, columns[i.max(j)]), lambda);
+                }
+                rows[i][i] += joint.weight;
+                for c in 0..3 {
+                    (rows[i][n + c], rows[n + c][i]) = (columns[i][c], columns[i][c]);
+                }
+                right[i] = -joint.weight * (q[i] - joint.stance) - dot(columns[i], lambda);
+            }
+            right[n..].copy_from_slice(&miss);
+            solve(&mut rows, &mut right);
+            last = right[..n].iter().fold(0.0, |most: f64, step| most.max(step.abs()));
+            let most = (last / 0.3).max(1.0);
+            q.iter_mut().chain(&mut lambda).zip(right).for_each(|(value, step)| *value += step / most);
         }
         false
-    }
-}
-
-/// The joint angles of a leg's nominal stance, with that of the joint about x that a leg of two joints lacks; zero where there are none.
-fn stance(leg: &LegSpec) -> [f64; 3] {
-    match leg.stance.as_deref() {
-        Some(&[a, b, c]) => [a, b, c],
-        Some(&[a, b]) => [0.0, a, b],
-        _ => [0.0; 3],
     }
 }
 
@@ -163,10 +202,15 @@ impl BodyMotion {
                 "meta.robot.legs: not one leg for each foot, each with its joints and its foot".into()
             );
         };
-        if legs.iter().any(|leg| leg.joints.len() != 3) {
-            return Err("meta.robot.legs: a leg has two or three joints".into());
+        if legs.iter().any(|leg| !(3..=MOST_JOINTS).contains(&leg.joints.len())) {
+            return Err(format!("meta.robot.legs: a leg has two to {MOST_JOINTS} joints"));
         }
-        let mut angles: Vec<[f64; 3]> = robot.legs.iter().map(stance).collect();
+        let most = legs.iter().map(|leg| leg.joints.len()).max();
+        let stated = plan.legs.as_ref().and_then(|legs| legs.joints.as_ref());
+        if stated.is_some_and(|stated| Some(stated.joints) != most) {
+            return Err("joint_position: not as many joints as the legs of meta.robot.legs have".into());
+        }
+        let mut angles: Vec<Vec<f64>> = legs.iter().map(Leg::stance).collect();
         let Some(trunk) = trunk(robot, &legs, &mut angles) else {
             return Err(
                 "meta.robot.legs: do not stand at their nominal places, or weigh more than the robot".into(),
@@ -202,10 +246,10 @@ impl BodyMotion {
             }
             if !found {
                 // Out of reach: no law that needs the posture holds.
-                (here, angles) = ([0.0; 3], robot.legs.iter().map(stance).collect());
+                (here, angles) = ([0.0; 3], legs.iter().map(Leg::stance).collect());
             }
             shift[n] = if found { here } else { [f64::NAN; 3] };
-            all_angles.extend(angles.iter().copied());
+            all_angles.extend(angles.iter().cloned());
             all_axes.push(axes);
             postures.push(links);
         }
@@ -223,7 +267,16 @@ impl BodyMotion {
                 })
             })
             .collect();
-        Ok(Some(Self { shift, momentum, angles: all_angles, links: postures, axes: all_axes, turns }))
+        let first_link = (0..feet).map(|e| 1 + legs[..e].iter().map(|leg| leg.joints.len()).sum::<usize>());
+        Ok(Some(Self {
+            shift,
+            momentum,
+            angles: all_angles,
+            links: postures,
+            first_link: first_link.collect(),
+            axes: all_axes,
+            turns,
+        }))
     }
 }
 
@@ -235,7 +288,7 @@ pub(super) fn spin(inertia: &Turn, before: &Turn, after: &Turn, step: f64) -> [f
 }
 
 /// What the links leave of the robot's mass, center of mass and inertia at the nominal stance; leaves the angles of that stance behind.
-fn trunk(robot: &MetaRobot, legs: &[Leg], angles: &mut [[f64; 3]]) -> Option<Placed> {
+fn trunk(robot: &MetaRobot, legs: &[Leg], angles: &mut [Vec<f64>]) -> Option<Placed> {
     let mut links = Vec::new();
     for ((leg, nominal), q) in legs.iter().zip(&robot.nominal).zip(angles) {
         if !leg.solve(add(*nominal, [0.0, 0.0, leg.radius]), q) {

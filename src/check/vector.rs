@@ -63,6 +63,28 @@ pub(super) fn product(a: &Turn, b: &Turn) -> Turn {
     a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
 }
 
+/// Solves `rows · x = right` by Gauss's elimination with pivots, in place: x is left in `right`. Not finite for a singular matrix.
+pub(super) fn solve(rows: &mut [Vec<f64>], right: &mut [f64]) {
+    let n = right.len();
+    for column in 0..n {
+        let largest = (column..n).max_by(|a, b| rows[*a][column].abs().total_cmp(&rows[*b][column].abs()));
+        let pivot = largest.unwrap_or(column);
+        rows.swap(column, pivot);
+        right.swap(column, pivot);
+        for row in column + 1..n {
+            let factor = rows[row][column] / rows[column][column];
+            for c in column..n {
+                rows[row][c] -= factor * rows[column][c];
+            }
+            right[row] -= factor * right[column];
+        }
+    }
+    for row in (0..n).rev() {
+        let known: f64 = (row + 1..n).map(|c| rows[row][c] * right[c]).sum();
+        right[row] = (right[row] - known) / rows[row][row];
+    }
+}
+
 /// The rotation by a rotation vector.
 pub(super) fn rotation(vector: [f64; 3]) -> Turn {
     let angle = norm(vector);

@@ -15,7 +15,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
-use crate::leg::Leg;
+use crate::leg::chain::ByJoint;
 use crate::leg::jet::Jet;
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
@@ -38,13 +38,12 @@ pub struct JointSpeed {
 struct Half {
     foot: usize,
     ends: [Instant; 2],
-    leg: Leg,
 }
 
 impl JointSpeed {
     /// For every swing of a leg whose geometry is known.
     pub fn new(model: &Model) -> Self {
-        let mut places = Vec::new();
+        let (mut places, mut offsets) = (Vec::new(), vec![0]);
         for (foot, leg) in model.legs.iter().enumerate() {
             let swings = |&at: &Instant| matches!(model.layout.phase_at(foot, at), Phase::Swing(_));
             if let Some(leg) = leg {
@@ -53,12 +52,11 @@ impl JointSpeed {
                     [[Instant::Sample(k), middle], [middle, Instant::Sample(k + 1)]]
                 });
                 let halves = halves.filter(|ends| ends.iter().any(swings));
-                places.extend(halves.map(|ends| Half { foot, ends, leg: *leg }));
+                for ends in halves {
+                    places.push(Half { foot, ends });
+                    offsets.push(offsets[offsets.len() - 1] + leg.swing_joints().len());
+                }
             }
-        }
-        let mut offsets = vec![0];
-        for place in &places {
-            offsets.push(offsets[offsets.len() - 1] + place.leg.swing_joints().len());
         }
         Self { places, offsets }
     }
@@ -76,15 +74,16 @@ impl Half {
     }
 
     /// The angles of the fast joints at its start (0) or end (1).
-    fn jets(&self, model: &Model, state: &State, after: usize) -> impl Iterator<Item = Jet> {
+    fn jets(&self, model: &Model, state: &State, after: usize) -> ByJoint<Jet> {
         let r = foot_in_base::value(model, state, self.place(after));
-        self.leg.posture(Jet::variables(&r)).swing_angles()
+        model.leg(self.foot).posture(Jet::variables(&r)).swing_angles()
     }
 
     /// Derivatives of the rows with respect to the angles at its start (0) or end (1).
-    fn scales(&self, model: &Model, after: usize) -> impl Iterator<Item = f64> {
+    fn scales<'a>(&self, model: &'a Model, after: usize) -> impl Iterator<Item = f64> + use<'a> {
         let rate = (2.0 * after as f64 - 1.0) / (0.5 * model.layout.time_step);
-        self.leg.swing_joints().map(move |j| rate / self.leg.speed_limit[j])
+        let leg = model.leg(self.foot);
+        leg.swing_joints().map(move |j| rate / leg.speed_limit[j])
     }
 }
 
@@ -106,9 +105,9 @@ impl Constraint for JointSpeed {
         for (place, first) in self.numbered() {
             let [before, after] = [0, 1].map(|after| {
                 let r = foot_in_base::value(model, state, place.place(after));
-                place.leg.posture::<f64>(r.into()).swing_angles()
+                model.leg(place.foot).posture::<f64>(r.into()).swing_angles()
             });
-            let rows = out[first..].iter_mut().zip(before.zip(after)).zip(place.scales(model, 1));
+            let rows = out[first..].iter_mut().zip(before.into_iter().zip(after)).zip(place.scales(model, 1));
             for ((row, (before, after)), scale) in rows {
                 *row = (after - before) * scale;
             }
@@ -118,7 +117,7 @@ impl Constraint for JointSpeed {
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
         for (place, offset) in self.numbered() {
             for after in 0..2 {
-                let rows = place.jets(model, state, after).zip(place.scales(model, after));
+                let rows = place.jets(model, state, after).into_iter().zip(place.scales(model, after));
                 for (j, (jet, scale)) in rows.enumerate() {
                     foot_in_base::add_derivative(
                         model,
@@ -143,7 +142,7 @@ impl Constraint for JointSpeed {
         for (place, first) in self.numbered() {
             for after in 0..2 {
                 let (mut by_r, mut by_rr) = (Vector3::zeros(), Matrix3::zeros());
-                let rows = place.jets(model, state, after).zip(place.scales(model, after));
+                let rows = place.jets(model, state, after).into_iter().zip(place.scales(model, after));
                 for ((jet, scale), lambda) in rows.zip(&multipliers[first..]) {
                     by_r += jet.first * (scale * lambda);
                     by_rr += jet.second * (scale * lambda);

@@ -7,12 +7,12 @@
 //! g is what the joint bears for the links below it, their weight and inertia: a known function of time, zero for massless legs
 //! ([`crate::nlp::leg_terms`]). Legs that the robot's file does not describe have no rows.
 //!
-//! Rows: HAA, HFE, KFE for each free force; fraction of the limit. That of the abduction that a leg of two joints lacks is zero.
+//! Rows: each joint for each free force; fraction of the limit. That of the abduction that a leg of two joints lacks is zero.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
-use crate::leg::Leg;
+use crate::leg::chain::ByJoint;
 use crate::leg::jet::{Jet, Scalar};
 use crate::nlp::contact_force::{ForceSample, force_samples};
 use crate::nlp::curvature::NodeCurvature;
@@ -28,21 +28,36 @@ use crate::trajectory::rotation::cross_matrix;
 /// Torques of standing legs.
 #[derive(Clone, Debug)]
 pub struct JointTorque {
-    places: Vec<(ForceSample, Leg)>,
+    places: Vec<ForceSample>,
+    /// First row of each place, and the number of rows.
+    offsets: Vec<usize>,
 }
 
 impl JointTorque {
     /// For every force of a leg whose geometry is known.
     pub fn new(model: &Model) -> Self {
-        let all = force_samples(model, |i| model.legs[i].is_some());
-        Self { places: all.into_iter().filter_map(|at| Some((at, model.legs[at.foot]?))).collect() }
+        let places = force_samples(model, |i| model.legs[i].is_some());
+        let mut offsets = vec![0];
+        for at in &places {
+            offsets.push(offsets[offsets.len() - 1] + model.leg(at.foot).joints());
+        }
+        Self { places, offsets }
+    }
+
+    /// The places with their first rows.
+    fn numbered(&self) -> impl Iterator<Item = (ForceSample, usize)> {
+        self.places.iter().copied().zip(self.offsets.iter().copied())
     }
 }
 
 /// ∂r/∂q by joint, each times m g over the joint's torque limit.
-fn columns<T: Scalar>(model: &Model, leg: &Leg, r: [T; 3]) -> [[T; 3]; 3] {
-    let columns = leg.posture(r).jacobian();
-    std::array::from_fn(|j| columns[j].map(|entry| entry * (model.mass * GRAVITY / leg.torque_limit[j])))
+fn columns<T: Scalar>(model: &Model, foot: usize, r: [T; 3]) -> ByJoint<[T; 3]> {
+    let leg = model.leg(foot);
+    let mut columns = leg.posture(r).jacobian();
+    for (column, limit) in columns.iter_mut().zip(&leg.torque_limit) {
+        *column = column.map(|entry| entry * (model.mass * GRAVITY / limit));
+    }
+    columns
 }
 
 /// The same with derivatives, f in the base frame, and f.
@@ -50,9 +65,8 @@ fn parts(
     model: &Model,
     state: &State,
     ForceSample { foot: i, sample: k, .. }: ForceSample,
-    leg: &Leg,
-) -> ([[Jet; 3]; 3], Vector3<f64>, Vector3<f64>) {
-    let columns = columns(model, leg, Jet::variables(&foot_in_base::value(model, state, (i, k))));
+) -> (ByJoint<[Jet; 3]>, Vector3<f64>, Vector3<f64>) {
+    let columns = columns(model, i, Jet::variables(&foot_in_base::value(model, state, (i, k))));
     let f = state.forces[i][k];
     (columns, state.base[k].rotation().tr_mul(&f), f)
 }
@@ -81,7 +95,7 @@ impl Constraint for JointTorque {
     }
 
     fn rows(&self) -> usize {
-        3 * self.places.len()
+        self.offsets[self.places.len()]
     }
 
     fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
@@ -90,26 +104,25 @@ impl Constraint for JointTorque {
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {
-        for (rows, &(ForceSample { foot: i, sample: k, .. }, leg)) in
-            out.chunks_exact_mut(3).zip(&self.places)
-        {
-            let columns = columns(model, &leg, foot_in_base::value(model, state, (i, k)).into());
+        for (ForceSample { foot: i, sample: k, .. }, first) in self.numbered() {
+            let leg = model.leg(i);
+            let columns = columns(model, i, foot_in_base::value(model, state, (i, k)).into());
             let local = state.base[k].rotation().tr_mul(&state.forces[i][k]);
             let own = model.leg_terms.joint_torque(i, k);
-            for (j, (row, column)) in rows.iter_mut().zip(columns).enumerate() {
-                *row = -own[j] / leg.torque_limit[j];
-                *row += Vector3::from(column).dot(&local);
+            for (j, column) in columns.into_iter().enumerate() {
+                let borne = own.get(j).map_or(0.0, |torque| torque / leg.torque_limit[j]);
+                out[first + j] = Vector3::from(column).dot(&local) - borne;
             }
         }
     }
 
     fn jacobian(&self, model: &Model, state: &State, first: usize, sink: &mut Sink) {
-        for (n, &(at, leg)) in self.places.iter().enumerate() {
+        for (at, offset) in self.numbered() {
             let ForceSample { foot: i, sample: k, .. } = at;
-            let (columns, local, f) = parts(model, state, at, &leg);
+            let (columns, local, f) = parts(model, state, at);
             let (turn, forces) = tangents(model, state, at);
             for (j, column) in columns.iter().enumerate() {
-                let row = first + 3 * n + j;
+                let row = first + offset + j;
                 let by_r: Vector3<f64> = (0..3).map(|c| column[c].first * local[c]).sum();
                 foot_in_base::add_derivative(model, state, (i, k), &by_r, &mut sink.row(row));
                 // d(Rᵀ f) = Rᵀ ([f] δ + df).
@@ -130,11 +143,12 @@ impl Constraint for JointTorque {
         curvature: &mut NodeCurvature,
         _sink: &mut Sink,
     ) {
-        for (lambda, &(at, leg)) in multipliers.chunks_exact(3).zip(&self.places) {
+        for (at, first) in self.numbered() {
             let ForceSample { foot: i, sample: k, .. } = at;
-            let (columns, local, f) = parts(model, state, at, &leg);
+            let (columns, local, f) = parts(model, state, at);
             let sum: [Jet; 3] = std::array::from_fn(|c| {
-                columns[0][c] * lambda[0] + columns[1][c] * lambda[1] + columns[2][c] * lambda[2]
+                let weighted = |j: usize| columns[j][c] * multipliers[first + j];
+                (1..columns.len()).fold(weighted(0), |sum, j| sum + weighted(j))
             });
             // In r alone.
             let torque = sum[0] * local.x + sum[1] * local.y + sum[2] * local.z;
@@ -166,6 +180,6 @@ impl Constraint for JointTorque {
     }
 
     fn place(&self, row: usize) -> RowPlace {
-        self.places[row / 3].0.place()
+        self.places[self.offsets.partition_point(|&first| first <= row) - 1].place()
     }
 }

@@ -4,19 +4,19 @@
 //!   (zᵀq − h(q)) n_z ≥ radius + margin,  q = p + R v(r),  r = Rᵀ(p_i − p) + s
 //! ```
 //!
-//! v(r) is a point of the shank by inverse kinematics, as seen from the center of mass, see [`crate::leg`]: the knee with its radius, and the
-//! shank's outermost corner. Over ground with edges, n_z is left out, h is the surface over which a ball of the knee's or the
-//! foot's size rolls, and near edges points on the axis of the shank's tube are constrained as well: an edge can reach between knee
-//! and foot. Legs that the robot's file does not describe have no rows.
+//! v(r) is a point of the leg by inverse kinematics, as seen from the center of mass, see [`crate::leg`]: the knee with its radius, the
+//! shank's outermost corner, and the upper joints of a leg of more than three. Over ground with edges, n_z is left out, h is the surface
+//! over which a ball of the knee's or the foot's size rolls, and near edges points on the axes of the tubes of these links are constrained
+//! as well: an edge can reach between knee and foot. Legs that the robot's file does not describe have no rows.
 //!
-//! Rows: knee, corner for each foot at every `STRIDE`-th sample; near edges knee, corner and tube at every sample, and in
+//! Rows: knee, corner and upper joints for each foot at every `STRIDE`-th sample; near edges these and the tubes at every sample, and in
 //! swing also halfway to the next; m.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
 use crate::leg::jet::{Jet, Scalar};
-use crate::leg::{Leg, ShankShape};
+use crate::leg::{Leg, LegPosture, LinkShape};
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
 use crate::nlp::ground_normal::clearance;
@@ -50,8 +50,20 @@ pub struct KneeClearance {
 struct LegPlace {
     foot: usize,
     at: Instant,
-    leg: Leg,
     near_edge: bool,
+}
+
+/// A point of a leg that keeps clear of the ground.
+#[derive(Clone, Copy, Debug)]
+enum Point<'a> {
+    /// The knee: the last joint.
+    Knee,
+    /// In the coordinates of the shank.
+    Corner([f64; 2]),
+    /// Of the axis of the shank's tube, likewise.
+    Tube([f64; 2]),
+    /// At a fraction of the line of a link.
+    Link(&'a LinkShape, f64),
 }
 
 impl KneeClearance {
@@ -59,22 +71,22 @@ impl KneeClearance {
     pub fn new(model: &Model) -> Self {
         let mut places = Vec::new();
         for (foot, leg) in model.legs.iter().enumerate() {
-            let Some(leg) = *leg else { continue };
+            let Some(leg) = leg else { continue };
             for k in 0..=model.layout.intervals {
                 let near_edge = is_near_edge(model, foot, k, leg.shank_length());
                 if near_edge || k % STRIDE == 0 {
-                    places.push(LegPlace { foot, at: k.into(), leg, near_edge });
+                    places.push(LegPlace { foot, at: k.into(), near_edge });
                 }
                 // A swinging leg moves by a hand's breadth from sample to sample.
                 let swings = matches!(model.layout.phase[foot][k], Phase::Swing(_));
                 if near_edge && swings && k < model.layout.intervals {
-                    places.push(LegPlace { foot, at: Instant::Between(k), leg, near_edge });
+                    places.push(LegPlace { foot, at: Instant::Between(k), near_edge });
                 }
             }
         }
         let mut offsets = vec![0];
         for place in &places {
-            offsets.push(offsets[offsets.len() - 1] + place.rows());
+            offsets.push(offsets[offsets.len() - 1] + place.points(model.leg(place.foot)).len());
         }
         Self { places, offsets }
     }
@@ -96,41 +108,64 @@ fn is_near_edge(model: &Model, foot: usize, k: usize, shank: f64) -> bool {
     patches.any(|patch| contact.has_edge_within(patch.center, shank))
 }
 
+/// Fractions of a line of some length, m, that are near enough to each other for a tube around it, from its start on and without its end.
+fn along(length: f64, leg: &Leg) -> impl Iterator<Item = f64> + use<> {
+    let spacing = TUBE_SPACING * leg.foot_radius.max(LEAST_RADIUS * leg.shank_length());
+    let count = (length / spacing).ceil() as usize;
+    (0..count).map(move |n| n as f64 / count as f64)
+}
+
 impl LegPlace {
-    fn rows(&self) -> usize {
-        2 + self.tube_points()
-    }
-
-    /// Points of the tube from its upper end on; the foot itself is not among them.
-    fn tube_points(&self) -> usize {
-        let Leg { shank: shape, foot_radius, .. } = self.leg;
-        let (tube, shank) = (shape.tube, self.leg.shank_length());
-        let spacing = TUBE_SPACING * foot_radius.max(LEAST_RADIUS * shank);
-        if self.near_edge { ((shank - tube[0]).hypot(tube[1]) / spacing).ceil() as usize } else { 0 }
-    }
-
-    /// The points v(r): knee, corner, and near edges those of the tube.
-    fn points<T: Scalar>(&self, model: &Model, r: [T; 3]) -> impl Iterator<Item = [T; 3]> {
-        let shift = model.leg_terms.shift(self.at);
-        let ShankShape { corner, tube, .. } = self.leg.shank;
-        let shank = self.leg.shank_length();
-        let posture = self.leg.posture(r);
-        let count = self.tube_points();
-        let of_tube = (0..count).map(move |n| {
-            let s = n as f64 / count as f64;
-            [tube[0] + s * (shank - tube[0]), (1.0 - s) * tube[1]]
-        });
-        let on_shank = [[0.0, 0.0], corner].into_iter().chain(of_tube);
-        on_shank.map(move |point| {
-            let q = posture.on_shank(point);
-            std::array::from_fn(|c| q[c] + -shift[c])
-        })
+    /// Those that have rows.
+    fn points<'a>(&self, leg: &'a Leg) -> Vec<Point<'a>> {
+        let ([start, across], shank) = (leg.shank.tube, leg.shank_length());
+        let mut points = vec![Point::Knee, Point::Corner(leg.shank.corner)];
+        if self.near_edge {
+            let fractions = along((shank - start).hypot(across), leg);
+            points.extend(fractions.map(|s| Point::Tube([start + s * (shank - start), (1.0 - s) * across])));
+        }
+        for link in &leg.links {
+            points.push(Point::Link(link, 0.0));
+            if self.near_edge {
+                let fractions = along((link.ends[1] - link.ends[0]).norm(), leg).skip(1);
+                points.extend(fractions.map(|s| Point::Link(link, s)));
+            }
+        }
+        points
     }
 }
 
-/// How far a point of the shank is above the surface for it, with the derivatives in q.
-fn above_ground(model: &Model, q: &Vector3<f64>, point: usize) -> (f64, Vector3<f64>, Matrix3<f64>) {
-    let surface = if point == 0 { &model.surfaces.knees } else { &model.surfaces.feet };
+impl Point<'_> {
+    /// v, as seen from the center of mass.
+    fn place<T: Scalar>(&self, posture: &LegPosture<'_, T>, shift: &Vector3<f64>) -> [T; 3] {
+        let q = match self {
+            Self::Knee => posture.on_shank([0.0; 2]),
+            Self::Corner(point) | Self::Tube(point) => posture.on_shank(*point),
+            Self::Link(link, fraction) => posture.on_link(link, *fraction),
+        };
+        std::array::from_fn(|c| q[c] + -shift[c])
+    }
+
+    /// How far it keeps from the ground, m.
+    fn least(&self, model: &Model, leg: &Leg) -> f64 {
+        let [knees, shanks] =
+            [margins::KNEE_CLEARANCE, margins::SHANK_CLEARANCE].map(|margin| model.size * margin);
+        match self {
+            Self::Knee => leg.shank.knee_radius + knees,
+            Self::Corner(_) => knees,
+            Self::Tube(_) => leg.shank.tube_radius + shanks,
+            Self::Link(link, 0.0) => link.radius + knees,
+            Self::Link(link, _) => link.radius + shanks,
+        }
+    }
+}
+
+/// How far a point is above the surface for it, with the derivatives in q.
+fn above_ground(model: &Model, q: &Vector3<f64>, point: Point) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let surface = match point {
+        Point::Knee | Point::Link(..) => &model.surfaces.knees,
+        Point::Corner(_) | Point::Tube(_) => &model.surfaces.feet,
+    };
     clearance(model, q, &surface.jet(q.x, q.y))
 }
 
@@ -152,7 +187,7 @@ impl Moved {
         model: &Model,
         state: &State,
         (i, at): (usize, Instant),
-        (point, local): (usize, [Jet; 3]),
+        (point, local): (Point, [Jet; 3]),
     ) -> Self {
         let base = state.base_at(at);
         let rotation = base.rotation();
@@ -177,11 +212,11 @@ impl Moved {
 
 impl LegPlace {
     fn moved(&self, model: &Model, state: &State) -> impl Iterator<Item = Moved> {
-        let at = (self.foot, self.at);
+        let (at, leg, shift) = ((self.foot, self.at), model.leg(self.foot), model.leg_terms.shift(self.at));
         let r = foot_in_base::value(model, state, at);
-        self.points(model, Jet::variables(&r))
-            .enumerate()
-            .map(move |point| Moved::new(model, state, at, point))
+        let posture = leg.posture(Jet::variables(&r));
+        let points = self.points(leg).into_iter();
+        points.map(move |point| Moved::new(model, state, at, (point, point.place(&posture, &shift))))
     }
 }
 
@@ -195,11 +230,11 @@ impl Constraint for KneeClearance {
     }
 
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(model.size * margins::KNEE_CLEARANCE);
         for (place, first) in self.numbered() {
-            lower[first] += place.leg.shank.knee_radius;
-            let tube = place.leg.shank.tube_radius + model.size * margins::SHANK_CLEARANCE;
-            lower[first + 2..first + place.rows()].fill(tube);
+            let leg = model.leg(place.foot);
+            for (row, point) in lower[first..].iter_mut().zip(place.points(leg)) {
+                *row = point.least(model, leg);
+            }
         }
         upper.fill(f64::INFINITY);
     }
@@ -208,9 +243,12 @@ impl Constraint for KneeClearance {
         for (place, first) in self.numbered() {
             let base = state.base_at(place.at);
             let r = foot_in_base::value(model, state, (place.foot, place.at));
-            for (point, local) in place.points(model, r.into()).enumerate() {
+            let (leg, shift) = (model.leg(place.foot), model.leg_terms.shift(place.at));
+            let posture = leg.posture::<f64>(r.into());
+            for (row, point) in out[first..].iter_mut().zip(place.points(leg)) {
+                let local = point.place(&posture, &shift);
                 let q = base.position() + base.rotation() * Vector3::from(local);
-                out[first + point] = above_ground(model, &q, point).0;
+                *row = above_ground(model, &q, point).0;
             }
         }
     }

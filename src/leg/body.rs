@@ -12,7 +12,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Leg;
-use super::chain::{Chain, JOINTS, Placed};
+use super::chain::{ByJoint, Chain, Placed};
 
 /// A rigid body that is part of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub struct Posture {
     /// The joints of each leg.
     pub joints: Vec<Placed<f64>>,
     /// Their angles, from the base down, rad.
-    pub angles: Vec<[f64; JOINTS]>,
+    pub angles: Vec<ByJoint<f64>>,
 }
 
 /// S(c) = |c|² 1 − c cᵀ.
@@ -69,7 +69,7 @@ impl Body {
         legs: &[Option<Leg>],
         nominal: &[Vector3<f64>],
     ) -> Option<Result<Self, String>> {
-        let legs = legs.iter().copied().collect::<Option<Vec<Leg>>>()?;
+        let legs = legs.iter().cloned().collect::<Option<Vec<Leg>>>()?;
         if legs.is_empty() || legs.iter().any(|leg| leg.chain.is_none()) {
             return None;
         }
@@ -104,6 +104,11 @@ impl Body {
         Some(Ok(body))
     }
 
+    /// The number of the first link of a leg.
+    pub fn first_link(&self, leg: usize) -> usize {
+        1 + self.legs[..leg].iter().map(Leg::joints).sum::<usize>()
+    }
+
     /// The trunk, then the links leg by leg.
     pub fn links(&self) -> impl Iterator<Item = Link> {
         let of_legs = self.legs.iter().filter_map(|leg| leg.chain.as_ref()).flat_map(|chain| {
@@ -114,12 +119,13 @@ impl Body {
 
     /// Calls with the joints of each leg, their angles and where they are, the centers of the feet at given places, base frame from the center of mass of the nominal
     /// stance, m.
-    fn for_each_leg(&self, feet: &[Vector3<f64>], mut visit: impl FnMut(&Chain, [f64; JOINTS], Placed<f64>)) {
+    fn for_each_leg(&self, feet: &[Vector3<f64>], mut visit: impl FnMut(&Chain, ByJoint<f64>, Placed<f64>)) {
         for (leg, foot) in self.legs.iter().zip(feet) {
             let Some(chain) = &leg.chain else { continue };
             let contact = foot - Vector3::z() * leg.foot_radius;
             let angles = leg.posture::<f64>(contact.into()).joint_angles();
-            visit(chain, angles, chain.place::<f64>(angles));
+            let placed = chain.place::<f64>(&angles);
+            visit(chain, angles, placed);
         }
     }
 
@@ -136,7 +142,7 @@ impl Body {
 
     /// The posture with the centers of the feet at given places, base frame from the center of mass of the nominal stance, m.
     pub fn posture(&self, feet: &[Vector3<f64>]) -> Posture {
-        let links = 1 + JOINTS * self.legs.len();
+        let links = self.first_link(self.legs.len());
         let mut posture = Posture {
             shift: self.trunk.center * self.trunk.mass,
             centers: Vec::with_capacity(links),

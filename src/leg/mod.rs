@@ -8,5 +8,5 @@ mod planar;
 mod serial;
 mod spec;
 
-pub use kinematics::{Leg, LegPosture, ShankShape};
+pub use kinematics::{Leg, LegPosture, LinkShape, ShankShape};
 pub use spec::{JointSpec, LegSpec};

@@ -91,8 +91,8 @@ fn rounded_root<T: Scalar>(u: T, rounding: f64) -> T {
 impl Planar {
     /// The closed form of a chain with the axes x, y, y or their opposites at zero angles, whose knee bends as at the joint angles
     /// `stance`; none for other chains.
-    pub fn of_chain(chain: &Chain, stance: [f64; 3], foot_radius: f64) -> Option<Self> {
-        let [haa, hfe, kfe] = &chain.joints;
+    pub fn of_chain(chain: &Chain, stance: &[f64], foot_radius: f64) -> Option<Self> {
+        let ([haa, hfe, kfe], &[_, _, stance]) = (&chain.joints[..], stance) else { return None };
         let sign = [haa.axis.x, hfe.axis.y, kfe.axis.y].map(f64::signum);
         let axes = [Vector3::x(), Vector3::y(), Vector3::y()];
         let aligned = chain.joints.iter().zip(axes).zip(sign);
@@ -102,8 +102,8 @@ impl Planar {
         let (thigh, shank) = (kfe.position, chain.foot);
         let from_down = |v: Vector3<f64>| v.x.atan2(-v.z);
         let turn = wrapped(from_down(shank) - from_down(thigh), 0.0);
-        let bent = wrapped(turn - sign[2] * stance[2], 0.0);
-        let middle = chain.joints.map(|joint| 0.5 * (joint.range[0] + joint.range[1]));
+        let bent = wrapped(turn - sign[2] * stance, 0.0);
+        let middle = [haa, hfe, kfe].map(|joint| 0.5 * (joint.range[0] + joint.range[1]));
         Some(Self {
             hip: [haa.position.x + hfe.position.x, haa.position.y, haa.position.z],
             rise: hfe.position.z,
@@ -291,17 +291,17 @@ mod tests {
             [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
             [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
         ] {
-            let mut chain = leg_of(axes);
+            let mut chain = leg_of(&axes);
             chain.joints[1].position.z = 0.03;
             for q in [[0.2, 0.3, 1.2], [-0.4, -0.2, -1.5], [0.1, 0.3, 0.9]] {
-                let leg = Planar::of_chain(&chain, q, 0.02).unwrap();
-                let contact = Vector3::from(chain.foot(q)) - Vector3::z() * 0.02;
+                let leg = Planar::of_chain(&chain, &q, 0.02).unwrap();
+                let contact = Vector3::from(chain.foot(&q)) - Vector3::z() * 0.02;
                 assert!(leg.reaches(contact.into()));
                 let posture = leg.posture::<f64>(contact.into());
                 for (found, expected) in posture.joint_angles().into_iter().zip(q) {
                     assert!((found - expected).abs() < 2e-3, "{found} {expected} for {q:?}");
                 }
-                let placed = chain.place::<f64>(posture.joint_angles());
+                let placed = chain.place::<f64>(&posture.joint_angles());
                 for (j, column) in posture.jacobian().into_iter().enumerate() {
                     let expected = Vector3::from(placed.moved_by(j, contact.into()));
                     assert!((Vector3::from(column) - expected).norm() < 2e-3, "joint {j} at {q:?}");
@@ -311,8 +311,8 @@ mod tests {
                 assert!((knee - Vector3::from(placed.point(2, &plane))).norm() < 1e-3);
             }
         }
-        let yaw = leg_of([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert!(Planar::of_chain(&yaw, [0.0; 3], 0.02).is_none());
+        let yaw = leg_of(&[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert!(Planar::of_chain(&yaw, &[0.0; 3], 0.02).is_none());
     }
 
     #[test]

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chain::{Chain, JOINTS, Joint};
-use super::kinematics::{Kinematics, Leg, ShankShape};
+use super::chain::{ByJoint, Chain, Joint, MOST_JOINTS};
+use super::kinematics::{Kinematics, Leg, LinkShape, ShankShape};
 use super::planar::{Counting, Planar};
 use super::serial::Serial;
 
@@ -68,12 +68,13 @@ pub struct LegSpec {
     pub foot: Option<[f64; 3]>,
     /// The joint angles that put the foot into its nominal place, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(length(min = 2, max = 3))]
+    #[schemars(length(min = 2, max = 7))]
     pub stance: Option<Vec<f64>>,
-    /// The joints from the base down: three, or two about the base's y axis. Vectors are in axes parallel to the base's at zero joint
-    /// angles.
+    /// The joints from the base down: three to seven, or two about the base's y axis. Vectors are in axes parallel to the base's at zero
+    /// joint angles. Of all postures of a leg of more than three joints for a place of its foot, plans have the one nearest to `stance`,
+    /// with each angle measured in ranges of its joint.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schemars(length(max = 3))]
+    #[schemars(length(max = 7))]
     pub joints: Vec<JointSpec>,
 }
 
@@ -102,6 +103,11 @@ pub struct JointSpec {
     pub center: [f64; 3],
     /// The link's inertia about that center: xx, yy, zz, xy, xz, yz, kg m².
     pub inertia: [f64; 6],
+    /// Radius of the link's parts around the line from this joint to the next, m, which keep clear of the ground; from the third joint to
+    /// the last but one. The last has `knee_radius` and the other shapes of the shank. Default: they are not looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub radius: Option<f64>,
 }
 
 /// What a leg must not be: the key below `[feet.leg]`, empty for the table itself, and what is wrong with it.
@@ -140,7 +146,7 @@ impl LegSpec {
             (Some(chain), _) => self.of_chain(chain, nominal)?,
             (None, Some(closed)) => self.of_closed_form(closed),
             (None, None) => {
-                return bad("joints", "missing; a leg has two or three joints, from the base to the foot");
+                return bad("joints", "missing; a leg has two to seven joints, from the base to the foot");
             }
         };
         if let (Some(_), Some(closed)) = (&leg.chain, &closed) {
@@ -199,15 +205,15 @@ impl LegSpec {
             foot_radius: self.foot_radius,
             counting: Counting::default(),
         };
-        self.leg(Kinematics::Planar(kinematics), None, [closed.speed_limit; JOINTS], closed.torque_limit)
+        let limits = closed.torque_limit.map(|torque| (closed.speed_limit, torque));
+        self.leg(Kinematics::Planar(kinematics), None, limits.into_iter().unzip())
     }
 
     fn leg(
         &self,
         kinematics: Kinematics,
         chain: Option<Chain>,
-        speed_limit: [f64; JOINTS],
-        torque_limit: [f64; JOINTS],
+        (speed_limit, torque_limit): (ByJoint<f64>, ByJoint<f64>),
     ) -> Leg {
         let shank = ShankShape {
             knee_radius: self.knee_radius,
@@ -215,7 +221,8 @@ impl LegSpec {
             tube: self.tube,
             tube_radius: self.tube_radius.unwrap_or(self.foot_radius),
         };
-        Leg { kinematics, chain, shank, foot_radius: self.foot_radius, speed_limit, torque_limit }
+        let links = chain.as_ref().map_or(Vec::new(), links);
+        Leg { kinematics, chain, shank, links, foot_radius: self.foot_radius, speed_limit, torque_limit }
     }
 
     /// The chain of joints, if the leg has one.
@@ -234,20 +241,24 @@ impl LegSpec {
         for (j, spec) in self.joints.iter().enumerate() {
             joints.push(spec.build().map_err(|e| BadLeg { key: format!("joints[{j}].{}", e.key), ..e })?);
         }
-        let joints = match joints[..] {
-            [first, second] => {
+        let last = joints.len() - 1;
+        if let Some(j) = (0..joints.len()).find(|j| joints[*j].radius.is_some() && !(2..last).contains(j)) {
+            let what = "given, allowed: from the third joint to the last but one; the last has `knee_radius`";
+            return bad(format!("joints[{j}].radius"), what);
+        }
+        match &mut joints[..] {
+            [first, _] => {
                 let hip = Joint::missing_abduction(first.position);
-                [hip, Joint { position: Vector3::zeros(), ..first }, second]
+                first.position = Vector3::zeros();
+                joints.insert(0, hip);
             }
-            [first, second, third] => [first, second, third],
-            _ => {
+            joints if (3..=MOST_JOINTS).contains(&joints.len()) => {}
+            joints => {
                 let count = joints.len();
-                return bad(
-                    "joints",
-                    format!("given {count}, allowed: two or three joints, from the base to the foot"),
-                );
+                let what = format!("given {count}, allowed: two to {MOST_JOINTS}, from the base to the foot");
+                return bad("joints", what);
             }
-        };
+        }
         Ok(Some(Chain { joints, foot: foot.into() }))
     }
 
@@ -257,7 +268,7 @@ impl LegSpec {
     }
 
     /// The angles of the chain's joints in the nominal stance, rad.
-    fn stance(&self) -> Result<[f64; JOINTS], BadLeg> {
+    fn stance(&self) -> Result<Vec<f64>, BadLeg> {
         let Some(stance) = &self.stance else {
             return bad("stance", "missing; the joint angles that put the foot into its nominal place, rad");
         };
@@ -274,15 +285,15 @@ impl LegSpec {
                 return bad("stance", what);
             }
         }
-        let missing = JOINTS - stance.len();
-        Ok(std::array::from_fn(|j| if j < missing { 0.0 } else { stance[j - missing] }))
+        let missing = self.is_sagittal().then_some(0.0);
+        Ok(missing.into_iter().chain(stance.iter().copied()).collect())
     }
 
     fn of_chain(&self, chain: Chain, nominal: [f64; 3]) -> Result<Leg, BadLeg> {
         let stance = self.stance()?;
         let lowered = Vector3::from(nominal) + Vector3::z() * self.foot_radius;
-        let off = (Vector3::from(chain.foot(stance)) - lowered).norm();
-        let length = chain.joints[1].position.norm() + chain.joints[2].position.norm() + chain.foot.norm();
+        let off = (Vector3::from(chain.foot(&stance)) - lowered).norm();
+        let length = chain.length();
         if off > AGREEMENT * length {
             let what = format!(
                 "puts the foot {off:.3} m away from its nominal place; allowed: {:.3} m (one of joints, foot, stance, nominal is wrong)",
@@ -290,23 +301,22 @@ impl LegSpec {
             );
             return bad("stance", what);
         }
-        let planar = Planar::of_chain(&chain, stance, self.foot_radius).map(Kinematics::Planar);
+        let planar = Planar::of_chain(&chain, &stance, self.foot_radius).map(Kinematics::Planar);
         if planar.is_none() && self.is_sagittal() {
-            let what = "given two whose axes are not the base's y axis, allowed: two about y (pitch and pitch), or three about any axes";
+            let what = "given two whose axes are not the base's y axis, allowed: two about y (pitch and pitch), or three to seven about any axes";
             return bad("joints", what);
         }
-        let serial = || Serial::new(&chain, stance, self.foot_radius).map(Kinematics::Serial);
+        let serial = || Serial::new(&chain, &stance, self.foot_radius).map(Kinematics::Serial);
         let Some(kinematics) = planar.or_else(serial) else {
             return bad("foot", "lies on the axis of the last joint, which cannot move it");
         };
-        let speed_limit = chain.joints.map(|joint| joint.speed_limit);
-        let torque_limit = chain.joints.map(|joint| joint.torque_limit);
-        Ok(self.leg(kinematics, Some(chain), speed_limit, torque_limit))
+        let limits = chain.joints.iter().map(|joint| (joint.speed_limit, joint.torque_limit)).unzip();
+        Ok(self.leg(kinematics, Some(chain), limits))
     }
 
     /// Refuses keys of the closed form that contradict the joints.
     fn agree(&self, leg: &Leg, closed: &ClosedForm) -> Result<(), BadLeg> {
-        let Kinematics::Planar(found) = leg.kinematics else {
+        let Kinematics::Planar(found) = &leg.kinematics else {
             return bad(
                 "hip",
                 "given with joints whose axes are not x, y, y, which have no closed form; leave it out",
@@ -334,6 +344,17 @@ impl LegSpec {
             None => Ok(()),
         }
     }
+}
+
+/// The links that could hit the ground, but the last.
+fn links(chain: &Chain) -> Vec<LinkShape> {
+    let pairs = chain.joints.windows(2).enumerate();
+    pairs
+        .filter_map(|(joint, pair)| {
+            let (own, next) = (&pair[0], &pair[1].position);
+            Some(LinkShape { joint, ends: [own.axis * own.axis.dot(next), *next], radius: own.radius? })
+        })
+        .collect()
 }
 
 impl JointSpec {
@@ -369,6 +390,7 @@ impl JointSpec {
             mass: self.mass,
             center: self.center.into(),
             inertia,
+            radius: self.radius,
         })
     }
 }

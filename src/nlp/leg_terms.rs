@@ -12,6 +12,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::leg::chain::ByJoint;
 use crate::trajectory::Instant;
 
 /// How the row of Euler's law at a sample depends on the acceleration of a swinging foot.
@@ -45,7 +46,7 @@ pub struct LegTerms {
     /// The part of that torque which follows the swinging feet, in the order of the rows; `torque` is without it.
     pub inertia: Vec<FootInertia>,
     /// `joint_torque[foot][k]`: what each joint bears at a sample without any force at the foot, N m.
-    pub joint_torque: Vec<Vec<[f64; 3]>>,
+    pub joint_torque: Vec<Vec<ByJoint<f64>>>,
 }
 
 impl LegTerms {
@@ -63,8 +64,8 @@ impl LegTerms {
         self.torque.get(k).copied().unwrap_or_default()
     }
 
-    /// The torques of a leg's joints at sample k, N m.
-    pub fn joint_torque(&self, foot: usize, k: usize) -> [f64; 3] {
-        self.joint_torque.get(foot).and_then(|leg| leg.get(k)).copied().unwrap_or_default()
+    /// The torques of a leg's joints at sample k, N m; none for massless legs.
+    pub fn joint_torque(&self, foot: usize, k: usize) -> &[f64] {
+        self.joint_torque.get(foot).and_then(|leg| leg.get(k)).map_or(&[], |torques| torques.as_slice())
     }
 }

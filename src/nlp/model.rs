@@ -191,6 +191,14 @@ impl Model {
         }
     }
 
+    /// The leg of a foot whose leg the robot's file describes.
+    ///
+    /// # Panics
+    /// If it does not.
+    pub fn leg(&self, foot: usize) -> &Leg {
+        self.legs[foot].as_ref().expect("a leg that the robot's file describes")
+    }
+
     /// The patch of a stance, where there is one.
     pub fn patch(&self, foot: usize, stance: usize) -> Option<&Patch> {
         self.patches.get(foot).map(|stances| &stances[stance])

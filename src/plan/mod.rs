@@ -129,13 +129,15 @@ pub struct LegSamples {
     pub joints: Option<JointSamples>,
 }
 
-/// The joints of the legs, three for each foot, from the base down.
+/// The joints of the legs, from the base down.
 #[derive(Clone, Debug)]
 pub struct JointSamples {
-    /// (N·E,) rad.
-    pub position: Vec<[f64; 3]>,
-    /// (N·E,) of the motors, N m.
-    pub torque: Vec<[f64; 3]>,
+    /// J: joints of the leg with the most of them, at least 3. The joints of a leg with fewer are the last ones of a row.
+    pub joints: usize,
+    /// (N·E·J,) rad.
+    pub position: Vec<f64>,
+    /// (N·E·J,) of the motors, N m.
+    pub torque: Vec<f64>,
 }
 
 /// Warped-space counterparts of the samples.

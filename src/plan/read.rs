@@ -266,10 +266,12 @@ fn read_legs(npz: &mut NpzReader, n: usize, e: usize) -> Result<Option<LegSample
         return Ok(None);
     }
     let joints = if ["joint_position", "joint_torque"].iter().any(|name| npz.has(name)) {
-        Some(JointSamples {
-            position: npz.points("joint_position", &[n, e])?,
-            torque: npz.points("joint_torque", &[n, e])?,
-        })
+        let (shape, position) = npz.finite_f64("joint_position")?;
+        let joints = shape.last().copied().unwrap_or(0);
+        if shape != [n, e, joints] {
+            return Err(npz.error("joint_position", format!("shape {shape:?}, expected ({n}, {e}, J)")));
+        }
+        Some(JointSamples { joints, position, torque: npz.f64("joint_torque", &[n, e, joints])? })
     } else {
         None
     };

@@ -9,9 +9,10 @@ use super::{
     WarpedBase, WarpedSamples,
 };
 use crate::ipopt::IterationRecord;
+use crate::leg::chain::ByJoint;
 use crate::nlp::Model;
 use crate::nlp::model::GRAVITY;
-use crate::planner::{Motion, Seconds};
+use crate::planner::{LegMotion, Motion, Seconds};
 use crate::program;
 use crate::scenario::{LoadedScenario, Scenario};
 use crate::terrain::{Ground, Patch};
@@ -99,10 +100,7 @@ impl Plan {
             legs: motion.legs.as_ref().map(|legs| LegSamples {
                 shift: legs.shift.iter().map(|v| (*v).into()).collect(),
                 angular_momentum: legs.angular_momentum.iter().map(|v| (*v).into()).collect(),
-                joints: Some(JointSamples {
-                    position: legs.joint_position.clone(),
-                    torque: legs.joint_torque.clone(),
-                }),
+                joints: Some(joint_samples(legs)),
             }),
             phase_durations: phase_durations(&model.layout),
             swing_beyond: swing_beyond(&model.layout),
@@ -118,6 +116,15 @@ impl Plan {
         plan.meta.solver.history_sha256 = Some(plan.history_sha256());
         plan
     }
+}
+
+fn joint_samples(legs: &LegMotion) -> JointSamples {
+    let joints = legs.joint_position.iter().map(ByJoint::len).max().unwrap_or(0);
+    let rows = |legs: &[ByJoint<f64>]| {
+        let row = |leg: &ByJoint<f64>| std::iter::repeat_n(0.0, joints - leg.len()).chain(leg.clone());
+        legs.iter().flat_map(row).collect()
+    };
+    JointSamples { joints, position: rows(&legs.joint_position), torque: rows(&legs.joint_torque) }
 }
 
 /// The upward unit normal of the ground under a foot at time k, in samples: that of its patch in stance, that of the surface

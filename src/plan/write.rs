@@ -32,8 +32,8 @@ impl Plan {
         for (name, values) in self.leg_members() {
             npz.add_points(name, &[n], values)?;
         }
-        for (name, values) in self.joint_members() {
-            npz.add_points(name, &[n, e], values)?;
+        for (name, joints, values) in self.joint_members() {
+            npz.add_f64(name, &[n, e, joints], values.iter().copied())?;
         }
         if let Some(warped) = &self.warped {
             if let Some(base) = &warped.base {
@@ -116,12 +116,12 @@ impl Plan {
         })
     }
 
-    /// The arrays of shape (N, E, 3) of the joints, by member name.
-    fn joint_members(&self) -> impl Iterator<Item = (&'static str, &Vec<[f64; 3]>)> {
-        self.legs
-            .iter()
-            .filter_map(|legs| legs.joints.as_ref())
-            .flat_map(|joints| [("joint_position", &joints.position), ("joint_torque", &joints.torque)])
+    /// The arrays of shape (N, E, J) of the joints, by member name, with J.
+    fn joint_members(&self) -> impl Iterator<Item = (&'static str, usize, &Vec<f64>)> {
+        self.legs.iter().filter_map(|legs| legs.joints.as_ref()).flat_map(|joints| {
+            [("joint_position", &joints.position), ("joint_torque", &joints.torque)]
+                .map(|(name, values)| (name, joints.joints, values))
+        })
     }
 
     /// The solver's history, by member name.
@@ -140,9 +140,11 @@ impl Plan {
         let base = self.base_members().map(|(name, values)| (name, n, values));
         let feet = self.foot_members().map(|(name, values)| (name, n * e, values));
         let legs = self.leg_members().map(|(name, values)| (name, n, values));
-        let joints = self.joint_members().map(|(name, values)| (name, n * e, values));
-        for (name, length, values) in base.into_iter().chain(feet).chain(legs).chain(joints) {
+        for (name, length, values) in base.into_iter().chain(feet).chain(legs) {
             ensure(name, values.len() == length, values.iter().flatten())?;
+        }
+        for (name, joints, values) in self.joint_members() {
+            ensure(name, values.len() == n * e * joints, values)?;
         }
         ensure("t", n >= 2, &self.t)?;
         ensure(

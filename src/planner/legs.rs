@@ -18,6 +18,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::leg::Leg;
 use crate::leg::body::{Body, Posture, spin};
+use crate::leg::chain::ByJoint;
 use crate::nlp::leg_terms::FootInertia;
 use crate::nlp::model::GRAVITY;
 use crate::nlp::{LegTerms, Model};
@@ -49,9 +50,9 @@ pub struct LegMotion {
     /// Of the whole robot about its center of mass; world frame, kg m²/s.
     pub angular_momentum: Vec<Vector3<f64>>,
     /// Of each foot's leg, from the base down, foot by foot at each end, rad.
-    pub joint_position: Vec<[f64; 3]>,
+    pub joint_position: Vec<ByJoint<f64>>,
     /// Of the motors, likewise, N m.
-    pub joint_torque: Vec<[f64; 3]>,
+    pub joint_torque: Vec<ByJoint<f64>>,
 }
 
 /// A motion of the whole robot in fine steps.
@@ -168,7 +169,7 @@ impl<'a> BodyMotion<'a> {
         LegMotion {
             shift: self.postures.iter().map(|posture| posture.shift).collect(),
             angular_momentum,
-            joint_position: self.postures.iter().flat_map(|posture| posture.angles.iter().copied()).collect(),
+            joint_position: self.postures.iter().flat_map(|posture| posture.angles.iter().cloned()).collect(),
             joint_torque: self.motor_torques(x),
         }
     }

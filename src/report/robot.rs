@@ -1,12 +1,13 @@
 //! A picture of a robot: its stance from the side and from above, with torso, reach boxes and where the feet can be.
 
+use std::f64::consts::PI;
+
 use super::axes::{Axes, range};
 use super::svg::{Font, Svg};
-use crate::leg::chain::{Chain, JOINTS};
 use crate::robot::{Box3, Foot, Robot};
 
-/// Angles of each joint at which the workspace is sampled.
-const SAMPLES: usize = 14;
+/// Postures in which the workspace is sampled.
+const SAMPLES: usize = 2744;
 /// Side of the dot of a sample, pixels.
 const DOT: f64 = 1.6;
 const COLORS: [&str; 8] =
@@ -96,23 +97,35 @@ impl View {
 
 /// The joints and the foot of a leg that stands at its nominal place.
 fn links(foot: &Foot) -> Vec<[f64; 3]> {
-    let Some((leg, chain)) = foot.leg().and_then(|leg| Some((leg, leg.chain?))) else { return Vec::new() };
-    let placed = chain.place(leg.posture::<f64>(foot.nominal).joint_angles());
-    placed.origin.into_iter().chain([placed.point(JOINTS - 1, &chain.foot)]).collect()
+    let Some(leg) = foot.leg() else { return Vec::new() };
+    let Some(chain) = &leg.chain else { return Vec::new() };
+    let placed = chain.place(&leg.posture::<f64>(foot.nominal).joint_angles());
+    let end = placed.point(leg.joints() - 1, &chain.foot);
+    placed.origin.into_iter().chain([end]).collect()
 }
 
-/// Contact points below the first joint for joint angles within their ranges.
+/// Contact points below the first joint for joint angles within their ranges. Of a leg of more than three joints, those whose posture in a
+/// plan has such angles.
 fn workspace(foot: &Foot) -> Vec<[f64; 3]> {
-    let Some((leg, chain)) = foot.leg().and_then(|leg| Some((leg, leg.chain?))) else { return Vec::new() };
-    let angle = |j: usize, k: usize| {
-        let [least, greatest] = chain.joints[j].range;
-        let [least, greatest] = [least.max(-std::f64::consts::PI), greatest.min(std::f64::consts::PI)];
-        least + (greatest - least) * k as f64 / (SAMPLES - 1) as f64
-    };
-    let all = (0..SAMPLES * SAMPLES * SAMPLES).map(|n| {
-        let q = [angle(0, n % SAMPLES), angle(1, n / SAMPLES % SAMPLES), angle(2, n / SAMPLES / SAMPLES)];
-        let [x, y, z] = Chain::foot(&chain, q);
+    let Some(leg) = foot.leg() else { return Vec::new() };
+    let Some(chain) = &leg.chain else { return Vec::new() };
+    let joints = chain.joints.len();
+    let ranges = || chain.joints.iter().map(|joint| [joint.range[0].max(-PI), joint.range[1].min(PI)]);
+    // Multiples of these fractions fill a cube of as many dimensions evenly: powers of 1/x with xⁿ⁺¹ = x + 1.
+    let x = (0..30).fold(2.0_f64, |x, _| (1.0 + x).powf(1.0 / (joints as f64 + 1.0)));
+    let steps: Vec<f64> = (1..=joints).map(|j| x.powi(-(j as i32))).collect();
+    let points = (0..SAMPLES).map(|n| {
+        let part = |step: &f64| (0.5 + n as f64 * step).fract();
+        let q: Vec<f64> = ranges().zip(&steps).map(|([a, b], step)| a + (b - a) * part(step)).collect();
+        let [x, y, z] = chain.foot(&q);
         [x, y, z - leg.foot_radius]
     });
-    all.filter(|p| p[2] < chain.joints[0].position.z - 2.0 * leg.foot_radius).collect()
+    let kept = |p: &[f64; 3]| {
+        let in_range = |p: [f64; 3]| {
+            let angles = leg.posture::<f64>(p).joint_angles();
+            angles.iter().zip(ranges()).all(|(q, [least, most])| (least..=most).contains(q))
+        };
+        p[2] < chain.joints[0].position.z - 2.0 * leg.foot_radius && (joints == 3 || in_range(*p))
+    };
+    points.filter(kept).collect()
 }

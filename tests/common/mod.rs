@@ -1,5 +1,6 @@
 //! Motions and hand-made plans for the tests.
 
+pub mod chains;
 pub mod files;
 pub mod inputs;
 

@@ -4,14 +4,15 @@ use nalgebra::Vector3;
 
 use super::BodyMotion;
 use crate::leg::body::spin;
+use crate::leg::chain::ByJoint;
 use crate::nlp::model::GRAVITY;
 use crate::trajectory::sampling;
 
 impl BodyMotion<'_> {
     /// What the joints of a leg bear at the n-th end of a step without a force at the foot, N m.
-    pub(super) fn joint_loads(&self, i: usize, n: usize) -> [f64; 3] {
-        let Some(chain) = &self.body.legs[i].chain else { return [0.0; 3] };
-        let first = 1 + chain.joints.len() * i;
+    pub(super) fn joint_loads(&self, i: usize, n: usize) -> ByJoint<f64> {
+        let Some(chain) = &self.body.legs[i].chain else { return ByJoint::new() };
+        let first = self.body.first_link(i);
         let at = |n: usize, l: usize| {
             self.positions[n] + self.rotations[n] * (self.postures[n].centers[l] - self.postures[n].shift)
         };
@@ -37,11 +38,12 @@ impl BodyMotion<'_> {
                 (acceleration * joint.mass, at(n, l), rate)
             })
             .collect();
-        std::array::from_fn(|j| {
+        let load = |j: usize| {
             let moment: Vector3<f64> =
                 loads[j..].iter().map(|(force, place, rate)| (place - origin(j)).cross(force) + rate).sum();
             (r * Vector3::from(posture.joints[i].axis[j])).dot(&moment)
-        })
+        };
+        (0..loads.len()).map(load).collect()
     }
 
     /// The torques of the motors at the ends of the steps for the forces of the variables x, foot by foot, N m:
@@ -52,7 +54,7 @@ impl BodyMotion<'_> {
     ///
     /// with g_j what the joint bears without the force ([`Self::joint_loads`]), a_j and o_j its axis and a point of it. Accelerations are
     /// averages over the two steps beside an end, and so is f.
-    pub(super) fn motor_torques(&self, x: &[f64]) -> Vec<[f64; 3]> {
+    pub(super) fn motor_torques(&self, x: &[f64]) -> Vec<ByJoint<f64>> {
         let (layout, unit) = (&self.model.layout, self.model.mass * GRAVITY);
         let (feet, ends) = (self.contacts.len(), self.postures.len());
         let forces: Vec<Vec<Vector3<f64>>> = (0..feet)
@@ -70,10 +72,11 @@ impl BodyMotion<'_> {
                 let local = self.rotations[n].tr_mul(&mean);
                 let (r, joints) = (self.foot_in_base(i, n), &self.postures[n].joints[i]);
                 let loads = self.joint_loads(i, n);
-                torques.push(std::array::from_fn(|j| {
+                let torque = |(j, load): (usize, f64)| {
                     let [axis, origin] = [joints.axis[j], joints.origin[j]].map(Vector3::from);
-                    loads[j] - axis.dot(&(r - origin).cross(&local))
-                }));
+                    load - axis.dot(&(r - origin).cross(&local))
+                };
+                torques.push(loads.into_iter().enumerate().map(torque).collect());
             }
         }
         torques

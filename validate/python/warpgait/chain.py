@@ -5,10 +5,11 @@ All vectors are in axes parallel to the base's at zero joint angles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from .arrays import Array
 from .model import Indices, merged
@@ -27,6 +28,7 @@ class Joint:
     mass: float  # kg
     center: Array  # (3,) m, from the joint
     inertia: Array  # (3, 3) kg m², about that center
+    radius: float | None = None  # m, of the link's parts around the line to the next joint, where they could hit the ground
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,22 @@ def rigid_bodies(model: Any, body: int) -> list[int]:
     return found
 
 
+def link_radius(model: Any, data: Any, joint: Joint, end: Array) -> float | None:
+    """Of a link's shapes around the line from the point of its joint's axis next to `end` (3,) to that, its next joint, m; none without shapes."""
+    number = model.joint(joint.name).id
+    bodies = rigid_bodies(model, int(model.jnt_bodyid[number]))
+    start = joint.axis * (joint.axis @ end)
+    line = end - start
+    radii = []
+    for g in np.flatnonzero(np.isin(model.geom_bodyid, bodies)):
+        center = data.geom_xpos[g] - data.xanchor[number] - start
+        along = np.clip(center @ line / max(line @ line, 1e-12), 0.0, 1.0)
+        # Across its longest extent.
+        thickness = float(np.sort(model.geom_aabb[g, 3:])[1])
+        radii.append(thickness + float(np.linalg.norm(center - along * line)))
+    return max(radii, default=None)
+
+
 def chains(model: Any, index: Indices, stance: Array) -> list[Chain]:
     """The legs of `model`, whose joint angles in the nominal stance are `stance` (E, J)."""
     data = at_zero(model)
@@ -80,6 +98,8 @@ def chains(model: Any, index: Indices, stance: Array) -> list[Chain]:
                 )
             )
             before = anchor
+        for j in range(2, len(joints) - 1):
+            joints[j] = replace(joints[j], radius=link_radius(model, data, joints[j], joints[j + 1].position))
         foot = data.site_xpos[index.site[e]] - before
         result.append(Chain(tuple(joints), foot, stance[e].copy()))
     return result

@@ -73,6 +73,8 @@ class Gains:
     weight_stance: float = 50.0
     weight_force: float = 3e-3
     weight_acceleration: float = 1e-3
+    posture: tuple[float, float] = (400.0, 40.0)  # of the joints of legs of more than three …
+    weight_posture: float = 0.05  # … which decide what the feet leave open
     least_normal_force: float = 5.0  # N, on feet that are not adhesive or do not touch the ground yet
 
 
@@ -92,6 +94,7 @@ def gains_for(size: float) -> Gains:
         trunk=pair(g.trunk),
         lever=size * g.lever,
         swing=pair(g.swing),
+        posture=pair(g.posture),
         stance_damping=g.stance_damping / slower,
         reach_down=size * g.reach_down,
         seek=(size * g.seek[0], size * g.seek[1]),
@@ -130,9 +133,11 @@ class WholeBody:
         self.failures = 0
         nv, E = model.nv, len(index.feet)
         self._M = np.zeros((nv, nv))
-        self._A = np.zeros((6 + 3 * E, nv))  # tasks A q̈ = b: center of mass, trunk, then the feet
-        self._b = np.zeros(6 + 3 * E)
+        joints = index.qvel.ravel() if reference.posture is not None else np.zeros(0, int)
+        self._A = np.zeros((6 + 3 * E + len(joints), nv))  # tasks A q̈ = b: center of mass, trunk, the feet, then the posture
+        self._b = np.zeros(len(self._A))
         self._A[3:6, 3:6] = np.eye(3)
+        self._A[6 + 3 * E + np.arange(len(joints)), joints] = 1
         self._contact_jacobian = np.zeros((E, 3, nv))
         self._jacobian_rate = np.zeros((3, nv))
         self._cones = friction_cones(reference.normal, self.friction)
@@ -165,7 +170,7 @@ class WholeBody:
         bias = data.qfrc_bias - data.qfrc_passive
         self._touch_down.update(k, self.reference.contact[k], touching)
         stance = np.flatnonzero(self.reference.contact[k] | self._touch_down.early)
-        weights = np.array(self._base_tasks(k, data, bias) + self._foot_tasks(k, data, touching))
+        weights = np.array(self._base_tasks(k, data, bias) + self._foot_tasks(k, data, touching) + self._posture_tasks(k, data))
         if self._applied is not None:
             bias[:6] -= self._applied.generalized(k, data.xmat[self.index.base].reshape(3, 3))
         H, gradient = self._objective(k, stance, weights)
@@ -236,6 +241,16 @@ class WholeBody:
             self._b[rows] = aside @ (wanted - self._jacobian_rate @ v)
             weights += [g.weight_stance if stance else g.weight_swing] * 3
         return weights
+
+    def _posture_tasks(self, k: int, data: Any) -> list[float]:
+        """Fill the right sides of A q̈ = b for the joints of legs of more than three; returns the rows' weights."""
+        posture, g, index = self.reference.posture, self.gains, self.index
+        if posture is None:
+            return []
+        step = posture[min(k + 1, len(posture) - 1)] - posture[k]
+        error, rate = posture[k] - data.qpos[index.qpos], step / self._period - data.qvel[index.qvel]
+        self._b[6 + 3 * len(index.feet) :] = (g.posture[0] * error + g.posture[1] * rate).ravel()
+        return [g.weight_posture] * error.size
 
     def _aside(self, stance: bool, data: Any) -> Array:
         """What a foot's task is multiplied with (3, 3): for legs of two joints, whose feet move in planes of the base.

@@ -1,7 +1,7 @@
 """Inverse kinematics of the legs of a model.
 
 There is a closed form for legs with hip abduction (about x), hip flexion and knee flexion (both about y), in either sense, and for those without
-the abduction; `serial.py` has the others.
+the abduction; `serial.py` has the others, of three to seven joints.
 """
 
 from __future__ import annotations
@@ -123,8 +123,13 @@ class PlanarLeg:
 Leg = PlanarLeg | SerialLeg
 
 
+def is_redundant(leg: Leg) -> bool:
+    """Whether a leg has many postures for a foot."""
+    return isinstance(leg, SerialLeg) and leg.is_redundant
+
+
 def legs(model: Any, feet: tuple[str, ...]) -> list[Leg]:
-    """The legs that end in `feet`, of two or three hinges each. Knees bend as in the keyframe `stand`."""
+    """The legs that end in `feet`. Knees bend as in the keyframe `stand`."""
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
     mujoco.mj_forward(model, data)
@@ -136,9 +141,9 @@ def _leg(model: Any, data: Any, name: str) -> Leg:
     anchors, axes = data.xanchor[ids].copy(), data.xaxis[ids].copy()
     haa, hfe, kfe = anchors[0], anchors[-2], anchors[-1]  # of two joints, the hip is the HFE
     expected = np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0]], float)[-len(ids) :]
-    signs = np.sign((axes * expected).sum(1))
+    signs = np.sign((axes[-3:] * expected).sum(1))
     foot = data.site(name).xpos.copy()
-    if not np.allclose(axes, signs[:, None] * expected, atol=_TOLERANCE):
+    if len(ids) > 3 or not np.allclose(axes[-3:], signs[:, None] * expected, atol=_TOLERANCE):
         if len(ids) == SAGITTAL:
             raise InputError(f"leg {name}: {PITCH_ONLY}")
         stance = model.key("stand").qpos[model.jnt_qposadr[ids]].copy()

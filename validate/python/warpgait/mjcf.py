@@ -9,7 +9,7 @@ import numpy as np
 from .arrays import Array
 from .skeleton import Leg, Link, Shape, Skeleton
 
-LINKS = ("HIP", "THIGH", "SHANK")  # without the first in legs of two joints
+LINKS = ("HIP", "THIGH", "SHANK")  # without the first in legs of two joints; links of legs with more have numbers
 SIDES = {1: ("",), 2: ("F", "H"), 3: ("F", "M", "H"), 4: ("1", "2", "3", "4")}  # of the legs of one side, from the front
 _ALIGNED = 1e-6
 FOOT_SOFTNESS = 0.01  # s, MuJoCo's solref of a foot
@@ -61,7 +61,8 @@ def _inertial(link: Link) -> str:
 
 def _leg(leg: Leg, foot: str) -> list[str]:
     lines, before, depths = [], np.zeros(3), len(leg.links)
-    for depth, (link, part) in enumerate(zip(leg.links, LINKS[-depths:], strict=True)):
+    names = LINKS[-depths:] if depths <= len(LINKS) else [f"LINK{depth + 1}" for depth in range(depths)]
+    for depth, (link, part) in enumerate(zip(leg.links, names, strict=True)):
         space = "  " * (depth + 3)
         low, high = link.limits.range or (-np.pi, np.pi)
         lines.append(f'{space}<body name="{foot}_{part}" pos="{_numbers(link.anchor - before)}">')

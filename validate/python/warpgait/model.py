@@ -1,7 +1,7 @@
 """Full robot models: where they are found, and what the rest of the package reads from them.
 
 A model is one MJCF file, `robots/NAME.xml`. It has a free joint `root`, a body `base`, and for each foot `F` a spherical geom `F`, a site `F` at
-its center, three hinges on the way from the base to it (or two in all legs), and a motor for each hinge. Names of bodies of that leg begin with `F`. A keyframe
+its center, three to seven hinges on the way from the base to it (or two in all legs; as many in each leg), and a motor for each hinge. Names of bodies of that leg begin with `F`. A keyframe
 `stand` holds the nominal stance. The custom numeric `joint_speed_limit` is in rad/s and `joint_power_limit`, if it has one, in W: one number for
 all joints, or one for each, leg by leg from the base down.
 """
@@ -25,7 +25,7 @@ from .text import is_name
 
 PITCH_ONLY = "a leg of two joints has both about the base's y axis (pitch and pitch)"
 SAGITTAL = 2  # joints of a leg whose foot moves in a plane of the base
-JOINT_COUNTS = (SAGITTAL, 3)  # of a leg; the same for all legs of a robot
+JOINT_COUNTS = (SAGITTAL, 3, 4, 5, 6, 7)  # of a leg; the same for all legs of a robot
 CARRIED, CARRIED_RADIUS = "carried", 0.01  # the body of a payload, which plans take for a point, and its radius of gyration, m
 ANYMAL_HEIGHT, SIZE_STEP = 0.43, 0.05  # m, of the ANYmals; sizes of robots are multiples of the step
 
@@ -105,6 +105,11 @@ class Indices:
     size: float  # of the robot, in ANYmals
 
     @property
+    def is_redundant(self) -> bool:
+        """Whether the legs have many postures for a foot."""
+        return bool(self.qvel.shape[1] > 3)
+
+    @property
     def joint_names(self) -> list[str]:
         """The E·J joints, leg by leg."""
         return [name for names in self.joints_of for name in names]
@@ -176,7 +181,7 @@ def leg_joints(model: Any, foot: str) -> list[int]:
     hinges = all(model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE) for j in found)
     if len(found) not in JOINT_COUNTS or not hinges:
         names = ", ".join(model.joint(j).name for j in found) or "none"
-        raise InputError(f"leg {foot}: its joints are {names}; the replay needs two or three hinges between base and foot")
+        raise InputError(f"leg {foot}: its joints are {names}; the replay needs two to seven hinges between base and foot")
     return found
 
 

@@ -53,7 +53,7 @@ _FLOATS: dict[str, tuple[str | int, ...]] = {
 # The same for members that only plans have whose legs have mass.
 _LEGS: dict[str, tuple[str | int, ...]] = {"center_of_mass_shift": ("N", 3), "angular_momentum": ("N", 3)}
 # The same, but plans of older versions do not have them.
-_JOINTS: dict[str, tuple[str | int, ...]] = {"joint_position": ("N", "E", 3), "joint_torque": ("N", "E", 3)}
+_JOINTS: dict[str, tuple[str | int, ...]] = {"joint_position": ("N", "E", "J"), "joint_torque": ("N", "E", "J")}
 _BOOLS: dict[str, tuple[str | int, ...]] = {"foot_contact": ("N", "E"), "foot_adhesive": ("E",)}
 
 
@@ -109,8 +109,8 @@ class Plan:
         Array | None
     )  # (N, 3) from where it is in the trunk at the nominal stance, base frame; None: massless legs
     angular_momentum: Array | None  # (N, 3) of trunk and legs about the center of mass, world, kg m²/s; None: massless legs
-    joint_position: Array | None  # (N, E, 3) from the base down, rad; None: massless legs, or a plan of an older version
-    joint_torque: Array | None  # (N, E, 3) of the motors, N m; None likewise
+    joint_position: Array | None  # (N, E, J) from the base down, rad; None: massless legs, or a plan of an older version
+    joint_torque: Array | None  # (N, E, J) of the motors, N m; None likewise
     terrain: Heightfield
     terrain_raw: Heightfield | None  # before smoothing, where the input was a raster and the plan is for the smoothed ground
     robot: PlannedRobot

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array, Bools, Integers
-from .kinematics import Leg, PlanarLeg
+from .kinematics import Leg, PlanarLeg, is_redundant
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,20 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
         ok[left[~clear]] = False
         left, center = left[clear], center[clear]
         q, possible = leg.inverse(center)
-        knee = leg.knee_angle(q)
         ok[left] = (
-            possible
-            & leg.within_limits(q)
-            & (knee >= rules.knee[0])
-            & (knee <= rules.knee[1])
-            & (leg.thigh_angle(q) <= rules.flexion)
-            & leg.is_regular(q)
+            possible & leg.within_limits(q) & _bends(leg, q, rules) & (leg.thigh_angle(q) <= rules.flexion) & leg.is_regular(q)
         )
     reached: Bools = ok.reshape(contact.shape[:-1])
     return reached
+
+
+def _bends(leg: Leg, q: Array, rules: ReachRules) -> Bools:
+    """Whether the knee of a leg is neither stretched nor folded, for joint angles (M, J). More than three joints do not hang on one of them."""
+    if is_redundant(leg):
+        return np.ones(len(q), bool)
+    knee = leg.knee_angle(q)
+    bends: Bools = (knee >= rules.knee[0]) & (knee <= rules.knee[1])
+    return bends
 
 
 def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:

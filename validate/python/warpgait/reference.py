@@ -33,6 +33,8 @@ class Reference:
     normal: Array  # (K, E, 3) of the terrain in stance; in the air, from contact point to center
     force: Array  # (K, E, 3)
     contact: Bools  # (K, E)
+    # (K, E, J) joint angles, rad, of legs of more than three joints; the feet leave those of others no choice
+    posture: Array | None = None
 
     @property
     def moves_at_start(self) -> bool:
@@ -40,8 +42,11 @@ class Reference:
         return bool(max(np.linalg.norm(self.com_velocity[0]), np.linalg.norm(self.angular_velocity[0])) > AT_REST)
 
 
-def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None = None) -> Reference:
-    """Evaluate `plan` at `rate` Hz from 0 to its end; `rolling` moves the feet's centers.
+def sample(
+    plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None = None, posture: Array | None = None
+) -> Reference:
+    """Evaluate `plan` at `rate` Hz from 0 to its end; `rolling` moves the feet's centers. `posture` (N, E, J)
+    has the joint angles at the plan's samples, for legs of more than three joints.
 
     Positions are cubic Hermite interpolants of the plan's samples and velocities. Orientations are interpolated spherically, all else
     linearly. Contact is that of the sample before. Forces are zero where a foot is not in contact.
@@ -76,4 +81,5 @@ def sample(plan: Plan, rate: float, foot_radius: float, rolling: Rolling | None 
         normal=normal,
         force=linear(plan.foot_force) * contact[..., None],
         contact=contact,
+        posture=None if posture is None else linear(posture),
     )

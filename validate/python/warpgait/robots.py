@@ -21,7 +21,7 @@ from .chain import Chain, Joint, chains
 from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import write_text
-from .kinematics import Leg, legs
+from .kinematics import Leg, is_redundant, legs
 from .model import (
     Composite,
     available_models,
@@ -44,9 +44,15 @@ LEAST_FRACTIONS = (1.0, 0.8, 0.6, 0.4)  # of these edges, in this order, until t
 LEAST_ROOM = 0.01  # m, for a robot of ANYmal's size: of the nominal foot inside its box
 RESOLUTION, SIDE = 0.01, 0.03  # m, for a robot of ANYmal's size: of the grid of the reach set; of a foot inside its quadrant
 PLAY = 0.0025  # m, for a robot of ANYmal's size: of the foot of a leg of two joints to each side of its plane
-SERIAL_CELLS = 36  # along the span of a leg whose inverse kinematics is numeric
+SERIAL_CELLS, REDUNDANT_CELLS = (
+    36,
+    22,
+)  # along the span of a leg whose inverse kinematics is numeric; of one of more than three joints
 
-MIRROR_SAMPLES, MIRROR_FRACTION = 20_000, 0.999  # random points in a mirrored reach box, and the fraction that the leg must reach
+MIRROR_SAMPLES, MIRROR_FRACTION = (
+    20_000,
+    0.999,
+)  # a quarter of them for a leg of more than three joints: random points in a mirrored reach box, and the fraction that the leg must reach
 KNEE_DISTANCE = 0.01  # m: a shape of the thigh this close to the KFE axis is part of the knee
 
 
@@ -232,7 +238,8 @@ def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: f
         for other, box in zip(all_legs, list(boxes), strict=False):
             mirror = np.append(np.sign(leg.hip[:2] * other.hip[:2]), 1.0)
             mirrored = Box(box.center * mirror, box.half_size)
-            points = mirrored.center + np.random.default_rng(0).uniform(-1, 1, (MIRROR_SAMPLES, 3)) * box.half_size
+            samples = MIRROR_SAMPLES // 4 if is_redundant(leg) else MIRROR_SAMPLES
+            points = mirrored.center + np.random.default_rng(0).uniform(-1, 1, (samples, 3)) * box.half_size
             if reached(leg, points, radius, trunk, rules).mean() >= MIRROR_FRACTION:
                 boxes.append(mirrored)
                 break
@@ -245,7 +252,7 @@ def _largest_box(name: str, leg: Leg, radius: float, trunk: Box, rules: ReachRul
     """The largest box with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
     resolution = RESOLUTION * size
     if isinstance(leg, SerialLeg):
-        resolution = max(resolution, leg.span / SERIAL_CELLS)
+        resolution = max(resolution, leg.span / (REDUNDANT_CELLS if is_redundant(leg) else SERIAL_CELLS))
     for fraction in LEAST_FRACTIONS:
         box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, resolution)
         if box is not None:
@@ -299,6 +306,7 @@ def _joint_lines(joint: Joint, origin: Array) -> list[str]:
         f"mass = {joint.mass:.6g}",
         f"center = {_row(joint.center, 6)}",
         f"inertia = [{', '.join(f'{v + 0.0:.6g}' for v in tensor)}]",
+        *([] if joint.radius is None else [f"radius = {joint.radius:.4f}"]),
     ]
 
 

@@ -1,4 +1,7 @@
-"""Numeric inverse kinematics of a leg of three joints with any axes, for many feet at once: the method of the planner (`src/leg/serial.rs`)."""
+"""Numeric inverse kinematics of a leg of three to seven joints with any axes, for many feet at once: the method of the planner
+(`src/leg/serial.rs`). Of all postures of a leg of more than three joints for a foot, it is the one nearest to the stance, with each angle measured
+in halves of its joint's range.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, Bools
+from .arrays import Array, Bools, Integers
 
 ROUNDING = 4e-3  # weight of the distance from the stance, in lengths of the leg: see the planner
+HALF_RANGE = (0.3, np.pi)  # rad, least and greatest half of a range in that
+LARGER = (
+    600.0,
+    70.0,
+    8.0,
+)  # factors of the squared weight in the minimizations that lead a leg of more than three joints to its posture
 REACHED = 3e-3  # how far from its target a foot that is reached may be, in lengths of the leg
 REGULAR = 0.15  # least singular value of ∂foot/∂q in a regular posture, in lengths of the leg
 _STEPS, _LARGEST_TURN, _CONVERGED, _POLISHING = 60, 0.6, 1e-6, 4  # of the minimization; rad; rad; steps without the weight
+_NEAR, _HALVINGS = 0.03, 8  # rad, of the last step with a larger weight; of a step that does not lead downhill
 _UPRIGHT = 0.8  # z of the first axis from which on a leg turns about the vertical, as an insect's does
+_THIGH = 0.2  # in lengths of the leg: the thigh is the first link below the first joint that is longer
 
 
 def turns(axis: Array, angles: Array) -> Array:
@@ -24,17 +35,24 @@ def turns(axis: Array, angles: Array) -> Array:
     return R
 
 
+def thigh_of(anchors: Array, foot: Array) -> int:
+    """The joint that moves the thigh of a leg with its joints at `anchors` (J, 3) and its foot at `foot` (3,)."""
+    links = np.linalg.norm(np.diff(anchors[1:], axis=0), axis=1)
+    least = _THIGH * (links.sum() + np.linalg.norm(foot - anchors[-1]))
+    return 1 + next((j for j, length in enumerate(links) if length > least), len(links) - 1)
+
+
 @dataclass(frozen=True)
 class SerialLeg:
     """One leg, read from the model at zero joint angles. Lengths in m, base frame."""
 
     name: str
-    anchors: Array  # (3, 3) a point on each axis, from the base down
-    axes: Array  # (3, 3) unit vectors
+    anchors: Array  # (J, 3) a point on each axis, from the base down
+    axes: Array  # (J, 3) unit vectors
     foot: Array  # (3,) its center
-    stance: Array  # (3,) rad: of all postures for a foot, the one that is reached from here is taken
-    lower: Array  # (3,) rad
-    upper: Array  # (3,) rad
+    stance: Array  # (J,) rad: of all postures for a foot, the one that is reached from here is taken
+    lower: Array  # (J,) rad
+    upper: Array  # (J,) rad
 
     @property
     def hip(self) -> Array:
@@ -43,8 +61,13 @@ class SerialLeg:
         return first
 
     @property
+    def is_redundant(self) -> bool:
+        """Whether it has many postures for a foot."""
+        return len(self.axes) > 3
+
+    @property
     def length(self) -> float:
-        """From the second joint over the third to the foot's center."""
+        """From the second joint over all others to the foot's center."""
         return float(np.linalg.norm(np.diff([*self.anchors[1:], self.foot], axis=0), axis=1).sum())
 
     @property
@@ -53,14 +76,21 @@ class SerialLeg:
         return self.length + float(np.linalg.norm(self.anchors[1] - self.anchors[0]))
 
     @property
+    def weights(self) -> Array:
+        """Of the squared distance of each joint from the stance (J,), m²."""
+        half = np.clip((self.upper - self.lower) / 2, *HALF_RANGE)
+        weights: Array = (ROUNDING * self.length / half) ** 2
+        return weights
+
+    @property
     def plane(self) -> Array:
         """Two unit vectors (2, 3) across the last joint's axis, the second one upward."""
-        return plane_across(self.axes[2])
+        return plane_across(self.axes[-1])
 
     @property
     def along(self) -> Array:
         """From the last axis to the foot, in `plane`, at zero joint angles: a unit vector (2,)."""
-        line = self.plane @ (self.foot - self.anchors[2])
+        line = self.plane @ (self.foot - self.anchors[-1])
         unit: Array = line / np.linalg.norm(line)
         return unit
 
@@ -68,81 +98,125 @@ class SerialLeg:
     def outward(self) -> Array:
         """Across that line, out of the bend (2,)."""
         across = np.array([-self.along[1], self.along[0]])
-        # In the stance, the second joint is on the inner side of the shank.
-        to_hip = self.plane @ turns(self.axes[2], -self.stance[2:])[0] @ (self.anchors[1] - self.anchors[2])
+        # In the stance, the joint before is on the inner side of the shank.
+        to_hip = self.plane @ turns(self.axes[-1], -self.stance[-1:])[0] @ (self.anchors[-2] - self.anchors[-1])
         return -across if across @ to_hip > 0 else across
 
     def place(self, q: Array) -> tuple[Array, Array, Array]:
-        """Foot centers (M, 3), points on the axes (M, 3, 3) and the axes (M, 3, 3) for joint angles (M, 3)."""
+        """Foot centers (M, 3), points on the axes (M, J, 3) and the axes (M, J, 3) for joint angles (M, J)."""
         R, at, before = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3)), np.zeros(3)
-        points, axes = np.empty((len(q), 3, 3)), np.empty((len(q), 3, 3))
-        for j in range(3):
+        points, axes = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
+        for j in range(q.shape[1]):
             at = at + R @ (self.anchors[j] - before)
             points[:, j], axes[:, j] = at, R @ self.axes[j]
             R, before = R @ turns(self.axes[j], q[:, j]), self.anchors[j]
         return at + R @ (self.foot - before), points, axes
 
     def inverse(self, foot: Array) -> tuple[Array, Bools]:
-        """Joint angles (..., 3) for foot centers (..., 3) in the base frame, and whether the leg reaches them.
+        """Joint angles (..., J) for foot centers (..., 3) in the base frame, and whether the leg reaches them.
 
         Joint limits are not applied.
         """
         foot = np.asarray(foot, float)
         targets = foot.reshape(-1, 3)
         q = np.tile(self.stance, (len(targets), 1))
-        weight = (ROUNDING * self.length) ** 2
-        active = np.flatnonzero(np.linalg.norm(targets - self.hip, axis=1) <= self.span)
-        for _ in range(_STEPS):
-            if not active.size:
-                break
-            step = self._step(q[active], targets[active], weight, self.stance)
-            q[active] += step
-            active = active[np.abs(step).max(1) > _CONVERGED]
+        within = np.flatnonzero(np.linalg.norm(targets - self.hip, axis=1) <= self.span)
+        if self.is_redundant:
+            for more in LARGER:
+                self._descend(q, targets, within, more, _NEAR)
+        self._descend(q, targets, within, 1.0, _CONVERGED)
         reached: Bools = np.linalg.norm(self.place(q)[0] - targets, axis=1) < REACHED * self.length
         for _ in range(_POLISHING):  # what the stance's weight has left
             within = np.flatnonzero(reached)
-            q[within] += self._step(q[within], targets[within], 1e-6 * weight, q[within])
-        return q.reshape(foot.shape), reached.reshape(foot.shape[:-1])
+            q[within] += self._gauss_newton(q[within], targets[within], 1e-6 * self.weights, q[within])
+        return q.reshape(*foot.shape[:-1], -1), reached.reshape(foot.shape[:-1])
 
-    def _step(self, q: Array, targets: Array, weight: float, stance: Array) -> Array:
-        """A Gauss-Newton step (M, 3) toward the least distance from the targets (M, 3), and from `stance` times a weight."""
+    def _descend(self, q: Array, targets: Array, active: Integers, more: float, last: float) -> None:
+        """Moves the postures `active` among q (M, J) downhill, with the weights times `more`, each until a step is smaller than `last`, rad."""
+        weights = more * self.weights
+        for _ in range(_STEPS):
+            if not active.size:
+                return
+            if self.is_redundant:
+                step = self._newton(q[active], targets[active], weights)
+            else:
+                step = self._gauss_newton(q[active], targets[active], weights, self.stance)
+            q[active] += step
+            active = active[np.abs(step).max(1) > last]
+
+    def _gauss_newton(self, q: Array, targets: Array, weights: Array, stance: Array) -> Array:
+        """A step (M, J) toward the least distance from the targets (M, 3), and from `stance` by `weights` (J,)."""
         at, points, axes = self.place(q)
         J = np.cross(axes, at[:, None] - points)  # (M, joint, 3)
-        gradient = np.einsum("mji,mi->mj", J, targets - at) - weight * (q - stance)
-        step = np.linalg.solve(J @ J.transpose(0, 2, 1) + weight * np.eye(3), gradient[..., None])[..., 0]
-        most = np.abs(step).max(1)
-        shortened: Array = step * np.minimum(1.0, _LARGEST_TURN / np.maximum(most, 1e-12))[:, None]
-        return shortened
+        gradient = np.einsum("mji,mi->mj", J, targets - at) - weights * (q - stance)
+        return _shortened(np.linalg.solve(J @ J.transpose(0, 2, 1) + np.diag(weights), gradient[..., None])[..., 0])
+
+    def _newton(self, q: Array, targets: Array, weights: Array) -> Array:
+        """The same with the curvature of the foot's place, which the choice among postures depends on; shortened until it leads downhill."""
+        at, points, axes = self.place(q)
+        J, off = np.cross(axes, at[:, None] - points), at - targets
+        gradient = np.einsum("mji,mi->mj", J, off) + weights * (q - self.stance)
+        normal = J @ J.transpose(0, 2, 1) + np.diag(weights)
+        # ∂²F/∂qᵢ∂qⱼ = aᵢ × ∂F/∂qⱼ for i ≤ j.
+        upper = np.triu(np.einsum("mic,mjc->mij", axes, np.cross(J, off[:, None])))
+        curved = upper + np.triu(upper, 1).transpose(0, 2, 1)
+        step = -np.linalg.solve(normal + curved, gradient[..., None])[..., 0]
+        uphill = np.einsum("mj,mj->m", step, gradient) >= 0
+        step[uphill] = -np.linalg.solve(normal[uphill], gradient[uphill, :, None])[..., 0]
+        step = _shortened(step)
+        value = self._value(at, targets, q, weights)
+        left = np.arange(len(q))
+        for _ in range(_HALVINGS):
+            moved = q[left] + step[left]
+            higher = self._value(self.place(moved)[0], targets[left], moved, weights) > value[left] * (1 + 1e-12)
+            left = left[higher & (np.abs(step[left]).max(1) > _CONVERGED)]
+            if not left.size:
+                break
+            step[left] /= 2
+        return step
+
+    def _value(self, at: Array, targets: Array, q: Array, weights: Array) -> Array:
+        """What is minimized (M,), with the feet's centers at `at` (M, 3)."""
+        value: Array = ((at - targets) ** 2).sum(1) + (weights * (q - self.stance) ** 2).sum(1)
+        return value
 
     def knee_angle(self, q: Array) -> Array:
-        """Angle between thigh and shank across the last axis, rad: 0 stretched, π folded; for joint angles (..., 3)."""
-        thigh = self.plane @ (self.anchors[2] - self.anchors[1])
+        """Angle between thigh and shank across the last axis of a leg of three joints, rad: 0 stretched, π folded; for joint angles (..., 3)."""
+        thigh = self.plane @ (self.anchors[-1] - self.anchors[-2])
         at_zero = np.arctan2(*(self.along[::-1])) - np.arctan2(*(thigh[::-1]))
         # The plane is seen from the tip of the last axis or from its other side.
-        sense = np.sign(np.cross(self.plane[0], self.plane[1]) @ self.axes[2])
-        angle: Array = np.abs((at_zero + sense * q[..., 2] + np.pi) % (2 * np.pi) - np.pi)
+        sense = np.sign(np.cross(self.plane[0], self.plane[1]) @ self.axes[-1])
+        angle: Array = np.abs((at_zero + sense * q[..., -1] + np.pi) % (2 * np.pi) - np.pi)
         return angle
 
     def thigh_angle(self, q: Array) -> Array:
-        """Angle of the thigh from straight down, rad, for joint angles (..., 3); 0 for a leg that turns about the vertical."""
-        if abs(self.axes[0, 2]) > _UPRIGHT:
+        """Angle of the thigh from straight down, rad, for joint angles (..., J); 0 for a leg of three joints that turns about the vertical."""
+        if abs(self.axes[0, 2]) > _UPRIGHT and not self.is_redundant:
             return np.zeros(q.shape[:-1])
-        _, points, _ = self.place(q.reshape(-1, 3))
-        thigh = points[:, 2] - points[:, 1]
+        _, points, _ = self.place(q.reshape(-1, q.shape[-1]))
+        joint = thigh_of(self.anchors, self.foot)
+        thigh = points[:, joint + 1] - points[:, joint]
         angle: Array = np.arccos(np.clip(-thigh[:, 2] / np.linalg.norm(thigh, axis=1), -1, 1))
         return angle.reshape(q.shape[:-1])
 
     def is_regular(self, q: Array) -> Bools:
-        """Whether the leg can move its foot in all directions, for joint angles (M, 3): not near the first axis, not stretched."""
+        """Whether the leg can move its foot in all directions, for joint angles (M, J): not near the first axis, not stretched."""
         at, points, axes = self.place(q)
         least = np.linalg.svd(np.cross(axes, at[:, None] - points), compute_uv=False)[:, -1]
         regular: Bools = least >= REGULAR * self.length
         return regular
 
     def within_limits(self, q: Array) -> Bools:
-        """Whether joint angles (..., 3) are within the limits."""
+        """Whether joint angles (..., J) are within the limits."""
         ok: Bools = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
         return ok
+
+
+def _shortened(step: Array) -> Array:
+    """Steps (M, J) that turn no joint by more than `_LARGEST_TURN`."""
+    most = np.abs(step).max(1)
+    shortened: Array = step * np.minimum(1.0, _LARGEST_TURN / np.maximum(most, 1e-12))[:, None]
+    return shortened
 
 
 def plane_across(axis: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a robot's description says, in the terms of the planner: a base, and legs of two or three hinges that end in feet.
+"""What a robot's description says, in the terms of the planner: a base, and legs of two to seven hinges that end in feet.
 
 Joints that belong to no leg (arms, heads, grippers, mimicking joints) are frozen, and their links are part of the link that carries them.
 """
@@ -25,6 +25,7 @@ GROUND_BAND = (
 )
 MOST_FEET = 8
 _ALIGNED = 1e-6  # of the direction of a joint axis
+ON_THE_SPOT = 0.02  # of the leg: a foot whose center is nearer to the last axis is only turned by it
 _INERTIA_ROUNDING = 0.01  # by how much a principal moment may exceed the sum of the other two, as a fraction
 
 
@@ -71,7 +72,7 @@ class Link:
 
 @dataclass
 class Leg:
-    """Two or three links from the base down, and the foot."""
+    """Two to seven links from the base down, and the foot."""
 
     links: list[Link]
     foot: Array  # (3,) its center, from the base's origin at zero joint angles
@@ -319,7 +320,7 @@ def _thickness(shape: Shape) -> float:
 
 
 def leg_of(reader: Reader, leaf: int, named: set[str], radius: float | None) -> Leg:
-    """The leg that ends in a leaf link; refuses one that has not two or three hinges."""
+    """The leg that ends in a leaf link; refuses one that has not two to seven hinges."""
     m = reader.model
     joints = reader.joints_above(leaf)
     names = ", ".join(reader.joint_name(j) for j in joints)
@@ -337,10 +338,16 @@ def leg_of(reader: Reader, leaf: int, named: set[str], radius: float | None) -> 
         extra = len(joints) - max(JOINT_COUNTS)
         hint = f"; hold {extra} of them still: --freeze JOINT=ANGLE, once for each" if extra > 0 else ""
         raise InputError(
-            f'{reader.path}: the leg to "{reader.name(leaf)}" has {len(joints)} joints ({names}); allowed: two or three{hint}'
+            f'{reader.path}: the leg to "{reader.name(leaf)}" has {len(joints)} joints ({names}); allowed: two to seven{hint}'
         )
     center, size, body, replaced = foot_of(reader, leaf, named, radius)
     links = [reader.link(int(m.jnt_bodyid[j]), j) for j in joints]
+    end = links[-1]
+    if np.linalg.norm(np.cross(center - end.anchor, end.axis)) < ON_THE_SPOT * np.linalg.norm(center - links[0].anchor):
+        raise InputError(
+            f'{reader.path}: joint "{end.joint}" turns the foot of the leg to "{reader.name(leaf)}" on the spot, as that of a wheel does; '
+            f"hold it still: --freeze {end.joint}"
+        )
     if len(links) == SAGITTAL and any(abs(link.axis[1]) < 1 - _ALIGNED for link in links):
         axes = " and ".join(str(np.round(link.axis, 3).tolist()) for link in links)
         raise InputError(

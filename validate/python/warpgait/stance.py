@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from .arrays import Array
 from .errors import InputError
 from .reach import Box
+from .serial import thigh_of
 from .skeleton import Leg, Skeleton
 
 STRETCH = 0.72  # height of the hip above the foot in a computed stance, in lengths of the leg from there: about ANYmal's
@@ -18,7 +19,10 @@ LEAST_HEIGHT = 0.35  # of the hip above the foot in a keyframe that is taken for
 AT_LIMIT = 0.02  # rad inside its range that a computed stance keeps each joint
 CENTRAL = 0.4  # of half a reach box: how far a foot stands from its middle, along x and y
 REACHED = 1e-5  # m
-_STARTS = 6  # of the search along each joint
+_STARTS, _REDUNDANT_STARTS = (
+    6,
+    3,
+)  # of the search along each of two joints; of a leg of more than three, whose others turn as well
 
 
 def turned(axis: Array, angle: float) -> Array:
@@ -46,16 +50,23 @@ def ranges(leg: Leg) -> Array:
     return np.array([row if row is not None else (-np.pi, np.pi) for row in rows])
 
 
+def thigh(leg: Leg) -> int:
+    """The joint from which a leg goes down: its last but one, or of more than three the one that moves the first long link."""
+    if len(leg.links) <= 3:
+        return len(leg.links) - 2
+    return thigh_of(np.array([link.anchor for link in leg.links]), leg.foot)
+
+
 def length(leg: Leg) -> float:
-    """Of a stretched leg, from its last joint but one to the center of its foot, m."""
-    thigh, shank = leg.links[-2:]
-    return float(np.linalg.norm(shank.anchor - thigh.anchor) + np.linalg.norm(leg.foot - shank.anchor))
+    """Of a stretched leg, from the joint of its thigh to the center of its foot, m."""
+    points = [link.anchor for link in leg.links[thigh(leg) :]] + [leg.foot]
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 def stands(legs: list[Leg], stance: list[Array]) -> bool:
-    """Whether all feet are well below the last joints but one of their legs."""
+    """Whether all feet are well below the thighs' joints of their legs."""
     return all(
-        frames[-2][1][2] - foot[2] >= LEAST_HEIGHT * length(leg)
+        frames[thigh(leg)][1][2] - foot[2] >= LEAST_HEIGHT * length(leg)
         for leg, q in zip(legs, stance, strict=True)
         for foot, frames in [place(leg, q)]
     )
@@ -67,8 +78,9 @@ def computed(legs: list[Leg]) -> list[list[Array]]:
     The first has the joint angles nearest to the middle of their ranges; of equally near ones, those with the knees toward the middle of the
     body. The others have all knees behind their feet, and all before them, where the ranges allow it.
     """
-    height = min(leg.links[-2].anchor[2] - STRETCH * length(leg) - leg.radius for leg in legs)
-    found = [_under_hip(leg, np.array([leg.links[-2].anchor[0], leg.foot[1], height + leg.radius])) for leg in legs]
+    hips = [leg.links[thigh(leg)].anchor for leg in legs]
+    height = min(hip[2] - STRETCH * length(leg) - leg.radius for hip, leg in zip(hips, legs, strict=True))
+    found = [_under_hip(leg, np.array([hip[0], leg.foot[1], height + leg.radius])) for hip, leg in zip(hips, legs, strict=True)]
     stances = [[min(postures, key=lambda p: p.rank).q for postures in found]]
     for side in (-1.0, 1.0):
         bent = [[p for p in postures if side * p.knee > 0] for postures in found]
@@ -103,13 +115,32 @@ def inside(legs: list[Leg], rough: list[Array], boxes: tuple[Box, ...]) -> list[
     return result
 
 
-def _solved(leg: Leg, start: Array, target: Array) -> Array | None:
-    """Joint angles near `start` that put the center of the foot at `target`, if the leg reaches it."""
+def _solved(leg: Leg, start: Array, target: Array, center: Array | None = None) -> Array | None:
+    """Joint angles near `start` that put the center of the foot at `target`, if the leg reaches it.
+
+    With more than three joints, they are the ones nearest to `center`, by default `start`, with each angle measured in its range.
+    """
     low, high = _bounds(leg)
-    result = least_squares(
-        lambda q: place(leg, q)[0] - target, np.clip(start, low, high), bounds=(low, high), xtol=1e-12, ftol=1e-12
+    start = np.clip(start, low, high)
+    result = least_squares(lambda q: place(leg, q)[0] - target, start, bounds=(low, high), xtol=1e-12, ftol=1e-12)
+    if np.linalg.norm(result.fun) >= REACHED:
+        return None
+    found: Array = result.x
+    if len(leg.links) <= 3:
+        return found
+    near = start if center is None else center
+    nearest = minimize(
+        lambda q: float((((q - near) / (high - low)) ** 2).sum()),
+        found,
+        method="SLSQP",
+        bounds=list(zip(low, high, strict=True)),
+        constraints={"type": "eq", "fun": lambda q: (place(leg, q)[0] - target) / length(leg)},
+        options={"ftol": 1e-10, "maxiter": 200},
     )
-    return result.x if np.linalg.norm(result.fun) < REACHED else None
+    reached = nearest.success and np.linalg.norm(place(leg, nearest.x)[0] - target) < REACHED
+    if reached:
+        found = nearest.x
+    return found
 
 
 def _bounds(leg: Leg) -> tuple[Array, Array]:
@@ -124,13 +155,16 @@ def _under_hip(leg: Leg, target: Array) -> list[_Posture]:
     low, high = _bounds(leg)
     middle, half = (low + high) / 2, (high - low) / 2
     found = []
-    starts = [np.linspace(lo, hi, _STARTS + 2)[1:-1] for lo, hi in zip(low[-2:], high[-2:], strict=True)]
-    for last in product(*starts):
-        start = np.array([*np.clip(0.0, low[:-2], high[:-2]), *last])
-        q = _solved(leg, start, target)
+    bending = slice(thigh(leg), thigh(leg) + 2)
+    count = _STARTS if len(leg.links) <= 3 else _REDUNDANT_STARTS
+    starts = [np.linspace(lo, hi, count + 2)[1:-1] for lo, hi in zip(low[bending], high[bending], strict=True)]
+    for angles in product(*starts):
+        start = np.clip(0.0, low, high)
+        start[bending] = angles
+        q = _solved(leg, start, target, middle)
         if q is not None:
             _, frames = place(leg, q)
-            knee = float(frames[-1][1][0] - target[0])
+            knee = float(frames[thigh(leg) + 1][1][0] - target[0])
             rank = float((((q - middle) / half) ** 2).sum()) + 1e-3 * float(np.sign(target[0])) * knee
             found.append(_Posture(q, rank, knee))
     if not found:

@@ -172,7 +172,8 @@ def validate(plan: Plan, settings: Settings | None = None, say: Callable[[str], 
             world = world_of(plan, robot, plan.terrain, settings.disturbance)
             analysis = analyze(plan, robot.model, world, robot.index)
             metrics = judge_open_loop(plan, analysis, robot.index)
-            reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling)
+            posture = analysis.qpos[:, robot.index.qpos] if robot.index.is_redundant else None
+            reference = sample(plan, settings.rate, robot.index.radius, analysis.rolling, posture)
             loop = ClosedLoop(plan, robot, reference, analysis.qpos[0])
             metrics.append(loop.collisions(OPEN_LOOP, plan.t, analysis.qpos))
             trials = _trials(plan, loop, world, settings, say)
