@@ -1,7 +1,9 @@
 //! From a scenario to a checked plan: terrain → map → NLP → plan → check. `warpgait solve`, `warpgait bench` and Python's
 //! `warpgait.solve` all run this.
 
-use std::fmt;
+mod again;
+mod event;
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -11,6 +13,7 @@ use crate::Result;
 use crate::check::{self, CheckReport};
 use crate::heightfield::Heightfield;
 use crate::ipopt::{INTERRUPT, NlpProblem};
+use crate::nlp::Tighter;
 use crate::plan::Plan;
 use crate::plan::sampled::Provenance;
 use crate::planner::derivatives::{self, DerivativeError};
@@ -18,53 +21,12 @@ use crate::planner::{self, GaitProblem, Host, Motion, Progress, Steps, Task};
 use crate::scenario::{Formulation, LoadedScenario, MapSpec};
 use crate::terrain::{self, Ground, Surfaces};
 use crate::trajectory::Gait;
-use crate::warp::{self, MapProgress, MapReport, WarpMap};
+use crate::warp::{self, MapReport, WarpMap};
+use again::{Judged, Teller};
+pub use event::{Event, Observer, Step};
 
 /// How many variables a check of the derivatives perturbs.
 const DERIVATIVE_VARIABLES: usize = 200;
-
-/// A step of the pipeline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
-    /// Reading robot and terrain.
-    Terrain,
-    /// Building the map, or reading it from the cache.
-    Map,
-    /// Comparing derivatives with differences.
-    Derivatives,
-    /// Solving the NLP.
-    Solve,
-    /// Sampling and checking the plan.
-    Plan,
-}
-
-impl fmt::Display for Step {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Terrain => "terrain",
-            Self::Map => "map",
-            Self::Derivatives => "derivatives",
-            Self::Solve => "solve",
-            Self::Plan => "plan",
-        })
-    }
-}
-
-/// Progress, for people who wait.
-#[derive(Clone, Debug)]
-pub enum Event<'a> {
-    /// A step begins.
-    Step(Step),
-    /// A remark that stays on the screen.
-    Note(&'a str),
-    /// An iteration of the map.
-    Map(MapProgress),
-    /// An iteration of the NLP.
-    Iteration(Progress<'a>),
-}
-
-/// Called at every event; may ask to stop, which takes effect at the next iteration.
-pub type Observer<'a> = dyn FnMut(&Event) -> ControlFlow<()> + 'a;
 
 /// A map and how it came about.
 pub struct BuiltMap {
@@ -133,7 +95,15 @@ impl Prepared {
     pub fn task<'a>(&'a self, loaded: &'a LoadedScenario, map: Option<&'a WarpMap>) -> Task<'a> {
         let (scenario, robot) = (&loaded.scenario, &loaded.robot);
         let guess = loaded.guess.as_deref();
-        Task { scenario, robot, steps: &self.steps, surfaces: &self.surfaces, guess, map }
+        Task {
+            scenario,
+            robot,
+            steps: &self.steps,
+            surfaces: &self.surfaces,
+            guess,
+            tighter: Tighter::default(),
+            map,
+        }
     }
 }
 
@@ -201,14 +171,10 @@ pub fn run(
         false => None,
     };
     let _ = observer(&Event::Step(Step::Solve));
-    let motion = planner::solve(&task, &mut Planning { spec: &scenario.map, observer: &mut *observer })
-        .map_err(|e| loaded.locate(e))?;
-
-    let _ = observer(&Event::Step(Step::Plan));
     let provenance = Provenance { loaded, ground: &prepared.ground, map_seconds };
-    let mut plan = Plan::from_motion(&motion, &provenance);
-    let check = check::check(&plan)?;
-    plan.meta.checks = check.rows.clone();
+    let mut host = Planning { spec: &scenario.map, observer };
+    let judged = again::plan_motion(&task, &mut host, &provenance).map_err(|e| loaded.locate(e))?;
+    let Judged { motion, plan, check } = judged;
     Ok(Some(Planned { prepared, map, plan, motion, check, derivatives }))
 }
 
@@ -216,6 +182,12 @@ pub fn run(
 struct Planning<'a, 'b> {
     spec: &'a MapSpec,
     observer: &'a mut Observer<'b>,
+}
+
+impl Teller for Planning<'_, '_> {
+    fn say(&mut self, event: &Event) {
+        let _ = (self.observer)(event);
+    }
 }
 
 impl Host for Planning<'_, '_> {

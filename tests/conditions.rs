@@ -62,6 +62,10 @@ fn contradictions_are_refused_with_both_lines() {
              [[keep_out]]\npolygon = [[-0.4, 0.1], [-0.2, 0.1], [-0.2, 0.3]]\n".into(),
             "s.toml:12: start.state.feet[2]: given [-0.3, 0.2], which is kept free of feet (keep_out[0].polygon, line 14)",
         ),
+        (
+            "[[goal.waypoints]]\nposition = [0.0, 1.5]\n[[keep_out]]\npolygon = [[-1.9, 0.7], [1.9, 0.7], [1.9, 3.0], [-1.9, 3.0]]\n".into(),
+            "s.toml:12: goal.waypoints[0].position: given [0, 1.5], where foot LF finds no place to stand: all that it reaches is kept free of feet (keep_out[0].polygon, line 14)",
+        ),
         ("[[keep_out]]\n".into(), "s.toml:11: keep_out[0]: gives neither a polygon nor a mask"),
         (
             "[[keep_out]]\nmask = \"absent.png\"\npolygon = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]\n".into(),
@@ -188,6 +192,7 @@ fn a_mask_keeps_feet_off_and_the_plan_has_its_outlines() {
         (npy("|b1", 1, 4, &[0; 4]), "keeps nothing free"),
         (npy("<U1", 1, 1, &[0; 4]), "has elements of type <U1; allowed: booleans and numbers"),
         (npy("|b1", 0, 4, &[]), "4 x 0 cells; allowed: 1 to"),
+        (npy("<f4", 1, 1, &f32::NAN.to_le_bytes()), "has 1 elements that are NaN"),
         (b"\x89PNG\r\n\x1a\n".to_vec(), "not a valid PNG image"),
     ] {
         std::fs::write(folder.path().join("mask.npy"), content).expect("a file");

@@ -4,7 +4,7 @@
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use warpgait::ipopt::NlpProblem;
-use warpgait::nlp::{Constraint, LegTerms};
+use warpgait::nlp::{Constraint, LegTerms, Tighter};
 use warpgait::planner::{GaitProblem, Steps, Task, derivatives};
 use warpgait::robot::Robot;
 use warpgait::scenario::{Formulation, Scenario};
@@ -47,8 +47,15 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));
     let steps = Steps::of(&scenario, &robot, &surfaces).expect("steps");
     let map = (scenario.formulation() != Formulation::Direct).then_some(&map);
-    let task =
-        Task { scenario: &scenario, robot: &robot, steps: &steps, surfaces: &surfaces, guess: None, map };
+    let task = Task {
+        scenario: &scenario,
+        robot: &robot,
+        steps: &steps,
+        surfaces: &surfaces,
+        guess: None,
+        tighter: Tighter::default(),
+        map,
+    };
     task.problem().expect("a problem")
 }
 

@@ -5,9 +5,11 @@ use std::path::Path;
 
 use crate::common::solved;
 use warpgait::check::check;
-use warpgait::pipeline::Prepared;
+use warpgait::pipeline::{Event, Prepared, run};
 use warpgait::plan::Plan;
+use warpgait::planner::{Reassignment, Trouble, reassignments};
 use warpgait::scenario::{load, load_text};
+use warpgait::trajectory::Gait;
 
 /// A short walk over a formula with edges.
 fn scenario(robot: &str, formulation: &str, expression: &str, goal: f64) -> String {
@@ -158,4 +160,44 @@ fn a_robot_with_a_short_reach_finds_footholds_on_stairs() {
     let loaded = load(&file, &["robot.name=anymal_b".to_owned()]).expect("a scenario");
     let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(()));
     assert!(prepared.is_ok(), "{}", prepared.err().map(|error| error.to_string()).unwrap_or_default());
+}
+
+#[test]
+fn other_steps_are_other_patches_for_the_stance_in_question_and_then_other_numbers_of_steps() {
+    let text = scenario("anymal_c", "direct", "0*x", 2.6)
+        .replace("horizon = 6.0", "horizon = 10.0")
+        .replace("2.4, -1.0", "3.6, -1.0");
+    let text = format!("{text}[solver]\nmax_iterations = 1\nexplain = false\n");
+    let (motion, _) = solved(&text);
+    let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+    let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
+    let task = prepared.task(&loaded, None);
+    let second = motion.model.layout.feet[0].stances[1].stance;
+    let time = 0.5 * (second.start + second.end) * motion.model.layout.time_step;
+    let others: Vec<_> = reassignments(&task, &motion, &[Trouble { foot: 0, time }]).collect();
+    let moved = &others[0];
+    assert!(moved.goes_on && moved.steps.gait == prepared.steps.gait, "{}", moved.words);
+    let [x, y] = moved.steps.patches[0][1].center;
+    assert!(!prepared.steps.patches[0][1].covers([x, y]), "({x}, {y})");
+    let steps = |gait: &Gait| gait.swings[0].len();
+    let differs = |other: &Reassignment| steps(&other.steps.gait) != steps(&prepared.steps.gait);
+    assert!(others[1..].iter().any(differs) && !others[1..].iter().any(|other| other.goes_on));
+}
+
+#[test]
+fn high_swings_hold_every_law_with_tighter_limits_if_need_be() {
+    let text = "formulation = \"warped\"\nhorizon = 6.0\n[robot]\nname = \"anymal_c\"\n[terrain]\nkind = \"flat\"\n\
+                [start]\nposition = [0.0, 0.0]\n[goal]\nposition = [1.0, 0.0]\n[motion]\nswing_clearance = 0.15\n";
+    let loaded = load_text("s.toml", text, ".".as_ref(), &[]).expect("a scenario");
+    let mut notes = Vec::new();
+    let planned = run(&loaded, false, &mut |event| {
+        notes.extend(if let Event::Note(note) = event { Some(note.to_string()) } else { None });
+        ControlFlow::Continue(())
+    });
+    let planned = planned.expect("no error").expect("a plan");
+    assert!(planned.check.passed, "{notes:?}");
+    // What was changed is said in the progress and in the plan.
+    let tried = notes.last().and_then(|note| note.split_once("trying ")).map_or("", |(_, words)| words);
+    let status = &planned.plan.meta.solver.status;
+    assert!(status.ends_with(tried) && *status == planned.motion.status, "{notes:?}: {status}");
 }

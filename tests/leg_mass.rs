@@ -7,7 +7,7 @@ use warpgait::heightfield::Heightfield;
 use warpgait::pipeline::Prepared;
 use warpgait::plan::Plan;
 use warpgait::plan::sampled::Provenance;
-use warpgait::planner::{Host, Progress, Stage, solve};
+use warpgait::planner::{Host, Progress, Stage, attempt};
 use warpgait::scenario::load_text;
 use warpgait::warp::WarpMap;
 
@@ -33,7 +33,7 @@ fn what_the_legs_mass_adds_is_settled_when_the_first_solve_ends() {
     let loaded = load_text("scenario", text, ".".as_ref(), &[]).expect("a scenario");
     let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("a ground");
     let mut watcher = Watcher(Vec::new());
-    let motion = solve(&prepared.task(&loaded, None), &mut watcher).expect("a motion");
+    let motion = attempt(&prepared.task(&loaded, None), &mut watcher).expect("a motion");
     assert!(motion.solved, "{}", motion.status);
     assert!(watcher.0.contains(&Stage::Whole));
     assert!(!watcher.0.iter().any(|stage| matches!(stage, Stage::LegMass { .. })), "{:?}", watcher.0);

@@ -18,6 +18,9 @@ use crate::nlp::term::{Constraint, RowPlace};
 use crate::nlp::{Model, State};
 use crate::terrain::Patch;
 
+/// Its name.
+pub const FOOTHOLD_PATCH: &str = "foothold patch";
+
 /// Footholds on their patches.
 #[derive(Clone, Debug)]
 pub struct FootholdPatch {
@@ -45,7 +48,7 @@ impl FootholdPatch {
 
 impl Constraint for FootholdPatch {
     fn name(&self) -> &'static str {
-        "foothold patch"
+        FOOTHOLD_PATCH
     }
 
     fn rows(&self) -> usize {

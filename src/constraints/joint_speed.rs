@@ -96,9 +96,10 @@ impl Constraint for JointSpeed {
         self.offsets[self.places.len()]
     }
 
-    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(-margins::JOINT_SPEED);
-        upper.fill(margins::JOINT_SPEED);
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        let limit = margins::JOINT_SPEED - model.tighter.joint_speed;
+        lower.fill(-limit);
+        upper.fill(limit);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {

@@ -98,9 +98,10 @@ impl Constraint for JointTorque {
         self.offsets[self.places.len()]
     }
 
-    fn bounds(&self, _model: &Model, lower: &mut [f64], upper: &mut [f64]) {
-        lower.fill(-margins::JOINT_TORQUE);
-        upper.fill(margins::JOINT_TORQUE);
+    fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
+        let limit = margins::JOINT_TORQUE - model.tighter.joint_torque;
+        lower.fill(-limit);
+        upper.fill(limit);
     }
 
     fn values(&self, model: &Model, state: &State, out: &mut [f64]) {

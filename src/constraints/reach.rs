@@ -4,8 +4,8 @@
 //!   center − half_size ≤ R(t)ᵀ (p_i(t) − p(t)) + s(t) ≤ center + half_size
 //! ```
 //!
-//! Rows: x, y, z in the base frame for each foot and sample, m; over ground with edges also halfway between samples in which a known
-//! leg swings, because a foot that is lifted over an obstacle leaves the straight line between them by more than the margin.
+//! Rows: x, y, z in the base frame for each foot and sample, m; also halfway between samples in which a known leg swings over ground with
+//! edges, or high and briefly, because such a foot leaves the straight line between them by more than the margin.
 
 use crate::nlp::curvature::NodeCurvature;
 use crate::nlp::foot_in_base;
@@ -17,6 +17,9 @@ use crate::trajectory::layout::Phase;
 use nalgebra::Vector3;
 
 use super::margins;
+
+/// Largest acceleration of a swing, in its height over its duration squared: 70 m/s² for 15 cm in 0.3 s, measured.
+const SWING_ACCELERATION: f64 = 42.0;
 
 /// Feet within reach at every sample.
 #[derive(Clone, Debug)]
@@ -38,17 +41,27 @@ fn margin(model: &Model, i: usize, at: Instant) -> f64 {
     }
 }
 
+/// Whether a swing is so brief for its height that the foot leaves the line between two samples by more than the margin.
+fn is_brief(model: &Model, i: usize, swing: usize, height: f64) -> bool {
+    let duration = model.layout.feet[i].swings[swing].swing;
+    let acceleration = SWING_ACCELERATION * height / (duration.end - duration.start).powi(2);
+    acceleration / 8.0 > model.size * margins::REACH_SWINGING
+}
+
 impl Reach {
-    /// Every foot at every sample, and in between where it may hurry.
-    pub fn new(model: &Model) -> Self {
+    /// Every foot at every sample, and in between where it may hurry. Swings rise to `swing_clearance`, m, or more.
+    pub fn new(model: &Model, swing_clearance: f64) -> Self {
         let samples = model.layout.intervals + 1;
         let mut places = Vec::new();
         for i in 0..model.feet() {
             places.extend((0..samples).map(|k| (i, Instant::Sample(k))));
-            if model.surfaces.have_edges() && model.legs[i].is_some() {
+            if model.legs[i].is_some() {
                 let between = (0..model.layout.intervals).map(Instant::Between);
-                let swings = |at: &Instant| matches!(model.layout.phase_at(i, *at), Phase::Swing(_));
-                places.extend(between.filter(swings).map(|at| (i, at)));
+                let hurries = |at: &Instant| match model.layout.phase_at(i, *at) {
+                    Phase::Swing(j) => model.surfaces.have_edges() || is_brief(model, i, j, swing_clearance),
+                    Phase::Stance(_) => false,
+                };
+                places.extend(between.filter(hurries).map(|at| (i, at)));
             }
         }
         Self { places }
@@ -67,7 +80,7 @@ impl Constraint for Reach {
     fn bounds(&self, model: &Model, lower: &mut [f64], upper: &mut [f64]) {
         for (r, &(i, at)) in self.places.iter().enumerate() {
             let reach = &model.reach[i];
-            let margin = model.size * margin(model, i, at);
+            let margin = model.size * margin(model, i, at) + model.tighter.reach;
             for c in 0..3 {
                 let half = (reach.half_size[c] - margin).max(margins::REACH_FRACTION * reach.half_size[c]);
                 lower[3 * r + c] = reach.center[c] - half;

@@ -12,6 +12,7 @@
 //! | --- | --- |
 //! | [`model`] | what stays the same during a solve |
 //! | [`leg_terms`] | part of it: what the legs' own mass adds |
+//! | [`tighter`] | part of it: by how much limits are tighter, after they were missed between the samples |
 //! | [`start`] | part of it: a given state at the start |
 //! | [`state`] | the ambient nodes at the present x |
 //! | [`term`] | what a constraint and a cost have to provide |
@@ -33,6 +34,7 @@ pub mod start;
 pub mod state;
 pub mod tangent;
 pub mod term;
+pub mod tighter;
 
 pub use cycle::Cycle;
 pub use leg_terms::LegTerms;
@@ -40,3 +42,4 @@ pub use model::Model;
 pub use start::Start;
 pub use state::State;
 pub use term::{Constraint, Cost};
+pub use tighter::Tighter;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::cycle::Cycle;
 use super::leg_terms::LegTerms;
 use super::start::Start;
+use super::tighter::Tighter;
 use crate::leg::Leg;
 use crate::leg::body::Body;
 use crate::robot::{Box3, Foot, Robot};
@@ -97,6 +98,8 @@ pub struct Model {
     pub nominal: Vec<Vector3<f64>>,
     /// By foot.
     pub reach: Vec<Box3>,
+    /// By how much limits are tighter than by the scenario and the margins.
+    pub tighter: Tighter,
     /// By foot, where the robot's file describes the leg.
     pub legs: Vec<Option<Leg>>,
     /// Trunk and links, where the legs have mass in this plan.
@@ -161,6 +164,7 @@ impl Model {
             standing_height: robot.standing_height(),
             nominal: robot.feet.iter().map(|f| Vector3::from(f.nominal)).collect(),
             reach: robot.feet.iter().map(|f| f.reach).collect(),
+            tighter: Tighter::default(),
             legs: robot.feet.iter().map(Foot::leg).collect(),
             body,
             leg_terms: LegTerms::default(),

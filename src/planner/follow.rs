@@ -14,6 +14,8 @@ use crate::{Error, Result};
 
 /// Points of a swing to which its control points are fitted.
 const SWING_POINTS: usize = 20;
+/// Footholds on patches that are farther than this from the motion's are other ones, m, for a robot of ANYmal's size.
+const MOVED: f64 = 0.05;
 /// Forces whose activation is less are not asked for.
 const LEAST_ACTIVATION: f64 = 1e-3;
 
@@ -107,6 +109,16 @@ fn set_swings(motion: &GivenMotion, model: &Model, x: &mut [f64]) -> Result<()> 
     for (i, foot) in layout.feet.iter().enumerate() {
         for (j, swing) in foot.swings.iter().enumerate() {
             let ends = [j, j + 1].map(|s| foot.stances[s].foothold.value::<3>(x));
+            let is_moved = |(end, k): (&[f64; 3], f64)| {
+                let place = model.spaces.feet.jet(&Vector3::from(*end), Order::First).position;
+                (place - Vector3::from(motion.foot(i, k * layout.time_step))).norm() > model.size * MOVED
+            };
+            // From or to another patch than the motion's, the guess leads over all that lies between.
+            if model.patch(i, j).is_some()
+                && ends.iter().zip([swing.swing.start, swing.swing.end]).any(is_moved)
+            {
+                continue;
+            }
             let mut rest = DMatrix::zeros(at.len(), 3);
             for (n, u) in at.iter().enumerate() {
                 let t = (swing.swing.start + u * (swing.swing.end - swing.swing.start)) * layout.time_step;

@@ -20,7 +20,7 @@ use super::base_path::{BasePath, FootMotion, REACH_MARGIN};
 use super::standing::Pose;
 use crate::nlp::Model;
 use crate::nlp::model::FixedFoothold;
-use crate::terrain::ContactGround;
+use crate::terrain::{ContactGround, Patch};
 use crate::{Error, Result};
 
 /// Distance of the places on a track, as a fraction of the half length of the reach box.
@@ -50,6 +50,9 @@ const LONGEST: f64 = 0.86;
 /// Highest step up or down, in standing heights.
 const HIGHEST: f64 = 0.58;
 
+/// The key to which errors about the way refer.
+pub const WAY: &str = "goal.position";
+
 /// Where a foot can stand.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
@@ -61,6 +64,17 @@ pub struct Place {
     pub point: Vector3<f64>,
     /// Squared distance to the left or right, room and roughness.
     cost: f64,
+}
+
+/// A patch that a stance had, and that failed.
+#[derive(Clone, Copy, Debug)]
+pub struct Avoided {
+    /// Whose stance.
+    pub foot: usize,
+    /// Its number.
+    pub stance: usize,
+    /// Around which places are not tried again.
+    pub patch: Patch,
 }
 
 /// A partial plan.
@@ -109,12 +123,19 @@ pub struct Search<'a> {
     tracks: Vec<Vec<Option<Place>>>,
     /// Stances whose place is given, by foot and number.
     fixed: Vec<(usize, usize, Place)>,
+    /// Patches that a stance must not have, where there are others.
+    avoided: &'a [Avoided],
     history: Vec<Touchdown>,
 }
 
 impl<'a> Search<'a> {
     /// Prepares the tracks of all feet along a path.
-    pub fn new(model: &'a Model, contact: &'a ContactGround, path: &'a BasePath<'a>) -> Self {
+    pub fn new(
+        model: &'a Model,
+        contact: &'a ContactGround,
+        path: &'a BasePath<'a>,
+        avoided: &'a [Avoided],
+    ) -> Self {
         let half = model.reach.iter().map(|r| r.half_size[0]).fold(f64::INFINITY, f64::min);
         let length = path.length;
         let count = (length / (APART * half)).ceil().max(1.0);
@@ -136,6 +157,7 @@ impl<'a> Search<'a> {
             largest_steps: (0..model.feet()).map(|foot| largest_step(model, path, foot)).collect(),
             tracks: vec![],
             fixed: vec![],
+            avoided,
             history: vec![],
         };
         search.motions = (0..model.feet())
@@ -334,7 +356,18 @@ impl<'a> Search<'a> {
     fn places_for(&self, foot: usize, stance: usize, s: f64) -> Vec<Place> {
         match self.fixed.iter().find(|fixed| (fixed.0, fixed.1) == (foot, stance)) {
             Some((.., place)) => vec![*place],
-            None => self.places_around(foot, s),
+            None => {
+                let mut places = self.places_around(foot, s);
+                let avoids = |place: &Place, avoided: &Avoided| {
+                    (avoided.foot, avoided.stance) == (foot, stance)
+                        && avoided.patch.covers([place.point.x, place.point.y])
+                };
+                let is_other = |place: &Place| !self.avoided.iter().any(|avoided| avoids(place, avoided));
+                if places.iter().any(is_other) {
+                    places.retain(is_other);
+                }
+                places
+            }
         }
     }
 
@@ -401,14 +434,15 @@ impl<'a> Search<'a> {
             (true, false) => "the ground there is a gap, too rough or too steep",
             (false, _) => "that is beyond the terrain",
         };
-        Error::input(format!(
+        let what = format!(
             "foot {} finds nothing to stand on within {reach:.2} m of x = {:.2}, y = {:.2} m at {:.1} s: {why}; {}",
             self.model.foot_names[foot],
             place.x,
             place.y,
             sample * self.model.layout.time_step,
             advice(self.contact)
-        ))
+        );
+        Error::key(WAY, what)
     }
 }
 

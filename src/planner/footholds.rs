@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::base_path::BasePath;
-use super::foothold_search::{Place, Search, advice, largest_step, obstacle};
+use super::foothold_search::{Avoided, Place, Search, WAY, advice, largest_step, obstacle};
 use super::standing::Pose;
 use crate::nlp::Model;
 use crate::scenario::Scenario;
@@ -16,13 +16,18 @@ const HOPELESS: f64 = 0.3;
 /// The same at the start, where the pose of the base is given.
 const HOPELESS_AT_START: f64 = 0.03;
 
-/// The best cells for the stances of a model.
+/// The best cells for the stances of a model, on other patches than those to be avoided.
 ///
 /// # Errors
 /// Where a foot finds nothing to stand on, or only what is out of its reach: which foot, where, when and by how much.
-pub fn assign(scenario: &Scenario, model: &Model, contact: &ContactGround) -> Result<Assignment> {
+pub fn assign(
+    scenario: &Scenario,
+    model: &Model,
+    contact: &ContactGround,
+    avoided: &[Avoided],
+) -> Result<Assignment> {
     let path = BasePath::new(scenario, model)?;
-    let (chosen, cost) = Search::new(model, contact, &path).run()?;
+    let (chosen, cost) = Search::new(model, contact, &path, avoided).run()?;
     let each = |places: &Vec<Place>| places.iter().map(|place| [place.point.x, place.point.y]).collect();
     ensure_start(model, contact, &path, &chosen)?;
     ensure_walkable(model, contact, &path.retimed(&chosen.iter().map(each).collect::<Vec<_>>()), &chosen)?;
@@ -99,7 +104,7 @@ fn ensure_walkable(
             } else {
                 continue;
             };
-            return Err(Error::input(format!(
+            let what = format!(
                 "foot {name} would have to step from x = {:.2}, y = {:.2} to x = {:.2}, y = {:.2} m at {:.1} s, {what}; {}",
                 a.x,
                 a.y,
@@ -107,19 +112,21 @@ fn ensure_walkable(
                 b.y,
                 layout.feet[foot].stances[j].stance.end * layout.time_step,
                 advice(contact)
-            )));
+            );
+            return Err(Error::key(WAY, what));
         }
         for (place, stance) in places.iter().zip(&layout.feet[foot].stances) {
             for k in [stance.stance.start, stance.stance.end] {
                 let beyond = out_of_box(model, foot, &path.pose(k * layout.time_step), &place.point);
                 if beyond > hopeless {
-                    return Err(Error::input(format!(
+                    let what = format!(
                         "foot {name} finds nothing to stand on in its reach at {:.1} s: the best place, x = {:.2}, y = {:.2} m, is {beyond:.2} m too far; {}",
                         k * layout.time_step,
                         place.point.x,
                         place.point.y,
                         advice(contact)
-                    )));
+                    );
+                    return Err(Error::key(WAY, what));
                 }
             }
         }

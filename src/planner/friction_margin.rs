@@ -1,38 +1,30 @@
-//! A solve; and when no motion is found: would one be, if the plan used more of the friction?
+//! When no motion is found: would one be, if the plan used more of the friction?
 
 use super::motion::Motion;
 use super::solve::{Host, attempt};
 use super::task::Task;
-use super::why::attempt_or_explain;
 use crate::Result;
 use crate::scenario::{Effort, Scenario};
-
-/// Plans a motion; if there is none that leaves `contact.friction_margin`, the status says whether a smaller margin would do.
-///
-/// # Errors
-/// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
-pub fn solve(task: &Task, host: &mut dyn Host) -> Result<Motion> {
-    let motion = attempt_or_explain(task, host)?;
-    advise(task, host, motion)
-}
 
 /// Adds to the status of a motion that was not found with which smaller `contact.friction_margin` one is found, if there is one.
 ///
 /// Solves once more with no margin and, if that succeeds, with half of the margin; feasible points suffice.
-fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
+///
+/// # Errors
+/// Those of [`attempt`].
+pub(super) fn advise(task: &Task, host: &mut dyn Host, motion: &mut Motion) -> Result<()> {
     let margin = task.scenario.contact.friction_margin;
     if motion.solved || motion.interrupted || margin == 0.0 {
-        return Ok(motion);
+        return Ok(());
     }
     let mut with_margin = |margin: f64| -> Result<Motion> {
         let mut scenario: Scenario = task.scenario.clone();
         scenario.contact.friction_margin = margin;
         scenario.solver.effort = Effort::Feasible;
-        scenario.solver.explain = false;
         attempt(&Task { scenario: &scenario, ..*task }, host)
     };
     let without = with_margin(0.0)?;
-    let mut motion = Motion { interrupted: without.interrupted, ..motion };
+    motion.interrupted = without.interrupted;
     if without.solved {
         let half = with_margin(0.5 * margin)?;
         motion.interrupted |= half.interrupted;
@@ -42,5 +34,5 @@ fn advise(task: &Task, host: &mut dyn Host, motion: Motion) -> Result<Motion> {
             motion.status
         );
     }
-    Ok(motion)
+    Ok(())
 }

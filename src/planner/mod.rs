@@ -20,8 +20,9 @@
 //! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
 //! | `task` | what is to be planned, as a model and as a program |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
-//! | `friction_margin` | the same, and what a smaller margin of friction would do |
+//! | `reassign` | when that fails over patches: other patches, or other numbers of steps |
 //! | `elastic`, `why` | when no motion is found: which limits would have to give |
+//! | `friction_margin` | the same: what a smaller margin of friction would do |
 //! | [`iterate`] | the motion at an iteration, for those who watch |
 //! | [`stage`] | which stages there are |
 //! | `stopping` | when a stage has done what its effort demands |
@@ -50,6 +51,7 @@ mod options;
 mod pace;
 mod places;
 pub mod problem;
+mod reassign;
 mod retiming;
 pub mod solve;
 pub mod stage;
@@ -65,14 +67,26 @@ mod way;
 mod why;
 
 pub use elastic::{Explanation, Shortfall};
-pub use friction_margin::solve;
 pub use hurry::ensure_possible;
 pub use iterate::{Iterate, IterateSamples};
 pub use legs::{FINE, LegMotion};
-pub use motion::{Motion, Seconds};
+pub use motion::{Motion, Seconds, Trouble};
 pub use problem::GaitProblem;
-pub use solve::{Host, Progress};
+pub use reassign::{Reassignment, reassignments};
+pub use solve::{Host, Progress, attempt, attempt_again};
 pub use stage::Stage;
 pub use start::given_pose;
 pub use steps::Steps;
 pub use task::Task;
+
+use crate::Result;
+
+/// Says why no motion was found, if that is so: in [`Motion::explanation`], and in the status whether a smaller `contact.friction_margin` would
+/// do.
+///
+/// # Errors
+/// Those of [`attempt`].
+pub fn explain(task: &Task, host: &mut dyn Host, motion: &mut Motion) -> Result<()> {
+    why::explain(task, host, motion)?;
+    friction_margin::advise(task, host, motion)
+}

@@ -23,6 +23,15 @@ pub struct Seconds {
     pub total: f64,
 }
 
+/// A foot at a time at which something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trouble {
+    /// Which foot.
+    pub foot: usize,
+    /// When, s.
+    pub time: f64,
+}
+
 /// A motion, solved or not.
 pub struct Motion {
     /// What it is a motion of.
@@ -35,6 +44,8 @@ pub struct Motion {
     pub status: String,
     /// Why it is not solved, where that was found.
     pub explanation: Option<Explanation>,
+    /// Footholds on the border of their patch that would rather be beyond it, the most urgent first.
+    pub pressed: Vec<Trouble>,
     /// Every constraint holds to the tolerance.
     pub solved: bool,
     /// By Ctrl-C, or by the host.

@@ -48,8 +48,10 @@ use crate::nlp::{Constraint, Cost, LegTerms, Model, State};
 const COST_SCALE: f64 = 1e3;
 /// Weight of the swings' acceleration, relative to that of the base's.
 const SWING_WEIGHT: f64 = 1e-3;
-/// The same over ground with edges, where swings are higher and longer: joints and controller must follow them.
-const SWING_WEIGHT_OVER_EDGES: f64 = 3e-2;
+/// The same where swings are higher and longer, as over ground with edges: joints and controller must follow them.
+const HIGH_SWING_WEIGHT: f64 = 3e-2;
+/// Elsewhere, swings are high from this clearance on, m, for a robot of ANYmal's size.
+const HIGH_SWING: f64 = 0.1;
 /// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
 const POSTURE_WEIGHT: f64 = 100.0;
 /// Weight of how standing feet share the load, relative to that of the forces' rate, in g over the standing height: the square of
@@ -109,15 +111,15 @@ impl GaitProblem {
                 Law::Pcdm => Box::new(Dynamics::centered(intervals)),
                 Law::NewtonEuler => Box::new(NewtonEuler::new(&model)),
             },
-            Box::new(Reach::new(&model)),
+            Box::new(Reach::new(&model, motion.swing_clearance)),
             match contact.cone {
                 Cone::Exact => Box::new(Friction::new(&model, friction)),
                 Cone::Conformal => Box::new(FrictionConformal::new(&model, friction)),
             },
             Box::new(NormalForce::new(&model, motion.force_limit, motion.pull_limit)),
             Box::new(OnGround::new(&model)),
-            Box::new(SwingClearance::new(&model, motion.swing_clearance)),
-            Box::new(BaseClearance::new(&model, motion.base_clearance)),
+            Box::new(SwingClearance::new(&model, motion.swing_clearance + model.tighter.swing_clearance)),
+            Box::new(BaseClearance::new(&model, motion.base_clearance + model.tighter.base_clearance)),
             Box::new(goal(&model, scenario)),
         ];
         if let Some(cycle) = &model.cycle {
@@ -157,7 +159,8 @@ impl GaitProblem {
         let mut costs: Vec<Box<dyn Cost>> = Vec::new();
         if choice.with_costs && base > 0.0 {
             costs.push(Box::new(BaseAcceleration::new(&model, base)));
-            let swing = if model.surfaces.have_edges() { SWING_WEIGHT_OVER_EDGES } else { SWING_WEIGHT };
+            let high = model.surfaces.have_edges() || motion.swing_clearance > model.size * HIGH_SWING;
+            let swing = if high { HIGH_SWING_WEIGHT } else { SWING_WEIGHT };
             costs.push(Box::new(SwingAcceleration::new(&model, swing * base)));
             costs.push(Box::new(Posture::new(&model, POSTURE_WEIGHT * base)));
         }

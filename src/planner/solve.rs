@@ -4,20 +4,20 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::elastic::{self, Explanation};
 use super::guess;
 use super::iterate::Iterate;
 use super::leg_update::{LEVER, LegUpdate};
 use super::legs::{self, BodyMotion, FINE};
-use super::motion::{Motion, Seconds};
+use super::motion::{Motion, Seconds, Trouble};
 use super::options;
 use super::problem::{Choice, GaitProblem};
 use super::stage::Stage;
 use super::stopping::StoppingRule;
 use super::task::Task;
 use super::violation;
+use crate::constraints::foothold_patch::FOOTHOLD_PATCH;
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, INTERRUPT, IterationRecord, LinearSolver, Multipliers, Status};
+use crate::ipopt::{self, IterationRecord, LinearSolver, Multipliers, Status};
 use crate::nlp::{LegTerms, Model};
 use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, GivenMotion, Hessian};
 use crate::terrain::Surfaces;
@@ -31,10 +31,10 @@ const CONTINUATION_STEPS: u32 = 3;
 const LEVEL: f64 = 1e-6;
 /// Fraction of the iterations that the plain solve may take when a continuation may follow.
 const PLAIN_FRACTION: f64 = 0.5;
+/// Multipliers of a patch's sides from this on count as large, cost a meter.
+const LARGE_MULTIPLIER: f64 = 1.0;
 /// Solves with another estimate of what the legs' mass adds, at most.
 const LEG_ROUNDS: usize = 6;
-/// Looking for a reason takes twice as long as the solve at most, or this long if that is more, s.
-const LEAST_SECONDS: u64 = 30;
 
 /// An iteration, for progress displays.
 #[derive(Clone, Debug)]
@@ -61,13 +61,13 @@ pub trait Host {
     fn build_map(&mut self, ground: &Heightfield) -> Result<Option<WarpMap>>;
 }
 
-/// Plans a motion: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
+/// Plans a motion, without looking for a reason if none is found: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
 /// the terrain grows out of the plane in steps, each solved from the one before; over ground with edges, a second solve that leaves
 /// the joints to the end. A motion that the scenario gives is solved from at once; if that fails, what follows forgets it.
 ///
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
-pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
+pub fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
     let steps = match solver.continuation {
         _ if is_level(&task.surfaces.posture) => 0,
@@ -85,7 +85,7 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let first = if over_edges || is_given { solve.at_once(budget)? } else { solve.joints_last(budget)? };
     let first = solve.with_leg_mass(first)?;
     if first.feasible || first.interrupted {
-        return Ok(solve.finish(first, None));
+        return Ok(solve.finish(first));
     }
     solve.given = None;
     let (how, second) = match (over_edges, steps) {
@@ -99,7 +99,7 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
         (false, steps) => ("also with a continuation", solve.continuation(steps)?),
     };
     let second = second.map(|second| solve.with_leg_mass(second)).transpose()?;
-    let mut end = match second {
+    let end = match second {
         None => first,
         Some(second) if second.feasible && second.stage.is_whole() => second,
         // Why nothing was found shows best in the solve that was not made easier.
@@ -109,8 +109,24 @@ pub(super) fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
             ..first
         },
     };
-    let explanation = solve.explain(&mut end);
-    Ok(solve.finish(end, explanation))
+    Ok(solve.finish(end))
+}
+
+/// Goes on after a motion that will not do: solves once more, from the guess or the motion that the task gives. Iterations and times count on.
+///
+/// # Errors
+/// Those of [`attempt`].
+pub fn attempt_again(task: &Task, host: &mut dyn Host, before: &Motion) -> Result<Motion> {
+    let budget = before.iterations + (task.scenario.solver.max_iterations as f64 * PLAIN_FRACTION) as usize;
+    let mut solve = Solve::new(task, host);
+    solve.iterations = before.iterations;
+    solve.history.clone_from(&before.history);
+    solve.seconds = before.seconds;
+    let spent = Duration::try_from_secs_f64(before.seconds.total).unwrap_or_default();
+    solve.start = solve.start.checked_sub(spent).unwrap_or(solve.start);
+    let end = solve.at_once(budget)?;
+    let end = solve.with_leg_mass(end)?;
+    Ok(solve.finish(end))
 }
 
 /// Whether nothing could grow in a continuation.
@@ -189,7 +205,8 @@ impl<'a> Solve<'a> {
         let x = self.guess(&model)?;
         model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
         let start = if self.given.is_some() { Start::Feasible } else { Start::Guess };
-        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, budget)
+        let left = budget.saturating_sub(self.iterations);
+        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
     }
 
     /// Solves from the guess, until there are `budget` iterations in all.
@@ -410,33 +427,10 @@ impl<'a> Solve<'a> {
         Ok(StageEnd { stage, problem, x, multipliers, mu, feasible, interrupted, status })
     }
 
-    /// Why a stage found no motion.
-    fn explain(&mut self, end: &mut StageEnd) -> Option<Explanation> {
-        let solver = &self.task.scenario.solver;
-        if !solver.explain || end.feasible || end.interrupted || self.interrupted {
-            return None;
-        }
-        // The whole problem with second derivatives, whatever the stage was, from the guess: a solve that failed can end anywhere.
-        let mut model = self.task.model().ok()?;
-        let x = self.guess(&model).ok()?;
-        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
-        let choice = Choice { with_costs: true, exact_hessian: true };
-        let mut problem = GaitProblem::new(self.task.scenario, model, x.clone(), choice);
-        let limit = (2 * self.start.elapsed()).max(Duration::from_secs(LEAST_SECONDS));
-        let (host, before, mut stopped) = (&mut *self.host, self.iterations, false);
-        let explanation = elastic::explain(&mut problem, &x, solver, limit, &mut |record| {
-            let iteration = before + record.iteration;
-            let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record, iterate: None });
-            stopped = flow.is_break();
-            flow
-        });
-        end.interrupted |= stopped || INTERRUPT.is_raised();
-        explanation
-    }
-
-    fn finish(mut self, mut end: StageEnd, explanation: Option<Explanation>) -> Motion {
+    fn finish(mut self, mut end: StageEnd) -> Motion {
         end.interrupted |= self.interrupted;
         let violations = violation::table(&mut end.problem, &end.x);
+        let pressed = pressed_footholds(&end.problem, &end.multipliers);
         self.seconds.total = self.start.elapsed().as_secs_f64();
         // Plans are sampled from the motion as it is, at the switches that were found.
         let mut model = Arc::unwrap_or_clone(end.problem.model);
@@ -454,7 +448,8 @@ impl<'a> Solve<'a> {
             solved: end.feasible && !end.interrupted,
             interrupted: end.interrupted,
             status: end.status,
-            explanation,
+            explanation: None,
+            pressed,
             legs,
             model,
             x: end.x,
@@ -465,6 +460,23 @@ impl<'a> Solve<'a> {
             seconds: self.seconds,
         }
     }
+}
+
+/// Footholds on the border of their patch that would rather be beyond it, the most urgent first.
+fn pressed_footholds(problem: &GaitProblem, multipliers: &Multipliers) -> Vec<Trouble> {
+    let model = &problem.model;
+    let Some((block, first)) = problem.blocks().find(|(block, _)| block.name() == FOOTHOLD_PATCH) else {
+        return Vec::new();
+    };
+    let mut pressed: Vec<(f64, Trouble)> = (0..block.rows())
+        .filter_map(|row| {
+            let (place, multiplier) = (block.place(row), multipliers.constraint.get(first + row)?.abs());
+            let trouble = Trouble { foot: place.foot?, time: place.sample * model.layout.time_step };
+            (multiplier > LARGE_MULTIPLIER).then_some((multiplier, trouble))
+        })
+        .collect();
+    pressed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    pressed.into_iter().map(|(_, trouble)| trouble).collect()
 }
 
 /// How a stage ended, in words.

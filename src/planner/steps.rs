@@ -1,13 +1,14 @@
 //! How many steps a motion takes over ground with edges, and where they are.
 
 use super::cyclic::ensure_repeats;
+use super::foothold_search::Avoided;
 use super::footholds::{Assignment, assign};
 use super::travel::{ensure_within_range, is_unhurried};
 use crate::nlp::Model;
 use crate::nlp::model::fixed_footholds;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
-use crate::terrain::{Patch, Surfaces};
+use crate::terrain::{ContactGround, Patch, Surfaces};
 use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Spaces};
 use crate::{Error, Result};
@@ -43,7 +44,7 @@ fn with_fixed(scenario: &Scenario, robot: &Robot, gaits: Vec<(f64, Gait)>) -> Re
     })
 }
 
-/// What it costs, the gait, and `[foot][stance]` the cells of the contact surface.
+/// What a step costs, the gait, and `[foot][stance]` the cells of the contact surface.
 type Footing = (f64, Gait, Vec<Vec<usize>>);
 
 /// When the feet step, and where.
@@ -53,6 +54,8 @@ pub struct Steps {
     pub gait: Gait,
     /// `[foot][stance]`: where, over ground with edges; else empty.
     pub patches: Vec<Vec<Patch>>,
+    /// Over ground with edges, gaits with other numbers of steps, the better ones first.
+    others: Vec<Footing>,
 }
 
 impl Steps {
@@ -70,30 +73,69 @@ impl Steps {
         let Some(contact) = &surfaces.contact else {
             let unhurried = gaits.iter().position(|(_, gait)| is_unhurried(scenario, robot, gait));
             let chosen = unhurried.unwrap_or(gaits.len() - 1);
-            return Ok(Self { gait: gaits[chosen].1.clone(), patches: Vec::new() });
+            return Ok(Self { gait: gaits[chosen].1.clone(), patches: Vec::new(), others: Vec::new() });
         };
-        // In ambient space, so that all formulations get the same patches.
-        let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
-        // The cost of a step, the gait, and the cells.
-        let with = |gait: Gait| -> Result<Footing> {
-            let model = Model::new(scenario, robot, &gait, surfaces.clone(), spaces.clone());
-            let Assignment { cells, cost } = assign(scenario, &model, contact)?;
-            let count = gait.swings.iter().map(Vec::len).sum::<usize>().max(1);
-            Ok((cost / count as f64, gait, cells))
-        };
-        // That of the usual gait first: if none will do, its error is reported.
-        let mut tried = gaits.into_iter().map(|(factor, gait)| {
-            with(gait).map(|(cost, gait, cells)| (cost + MORE_STEPS * (1.0 - factor), gait, cells))
-        });
-        let usual = tried.next().expect("at least the usual gait");
-        let better = |best: Result<Footing>, next: Result<Footing>| match (&best, &next) {
-            (_, Err(_)) => best,
-            (Ok((least, ..)), Ok((cost, ..))) if cost >= least => best,
-            _ => next,
-        };
-        let (_, gait, cells) = tried.fold(usual, better)?;
+        let (mut found, mut refused) = (Vec::new(), None);
+        for (factor, gait) in gaits {
+            match footing(scenario, robot, surfaces, contact, gait, &[]) {
+                Ok((cost, gait, cells)) => found.push((cost + MORE_STEPS * (1.0 - factor), gait, cells)),
+                // If none will do, what is wrong with the usual gait is reported.
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match (found.is_empty(), refused) {
+            (true, Some(error)) => Err(error),
+            _ => Ok(Self::on(contact, found)),
+        }
+    }
+
+    /// With the first of some footings.
+    fn on(contact: &ContactGround, mut footings: Vec<Footing>) -> Self {
+        let (_, gait, cells) = footings.remove(0);
         // Around each cell the largest rectangle in which the NLP may move the foothold.
         let patches = cells.iter().map(|cells| cells.iter().map(|cell| contact.patch(*cell)).collect());
-        Ok(Self { gait, patches: patches.collect() })
+        Self { gait, patches: patches.collect(), others: footings }
     }
+
+    /// The same gait with other patches for some stances, given by foot and number; none if the search finds none.
+    pub(super) fn moved(
+        &self,
+        scenario: &Scenario,
+        robot: &Robot,
+        surfaces: &Surfaces,
+        stances: &[(usize, usize)],
+    ) -> Option<Self> {
+        let contact = surfaces.contact.as_ref()?;
+        let avoid = |&(foot, stance): &(usize, usize)| {
+            Some(Avoided { foot, stance, patch: *self.patches.get(foot)?.get(stance)? })
+        };
+        let avoided: Vec<Avoided> = stances.iter().filter_map(avoid).collect();
+        let footing = footing(scenario, robot, surfaces, contact, self.gait.clone(), &avoided).ok()?;
+        let moved = Self::on(contact, vec![footing]);
+        (moved.patches != self.patches).then_some(moved)
+    }
+
+    /// With the n-th other gait, and the patches that it has.
+    pub(super) fn with_other_gait(&self, surfaces: &Surfaces, n: usize) -> Option<Self> {
+        let contact = surfaces.contact.as_ref()?;
+        Some(Self::on(contact, vec![self.others.get(n)?.clone()]))
+    }
+}
+
+/// Footholds for a gait.
+fn footing(
+    scenario: &Scenario,
+    robot: &Robot,
+    surfaces: &Surfaces,
+    contact: &ContactGround,
+    gait: Gait,
+    avoided: &[Avoided],
+) -> Result<Footing> {
+    // In ambient space, so that all formulations get the same patches.
+    let spaces = Spaces { base: Space::Direct, feet: Space::Direct };
+    let model = Model::new(scenario, robot, &gait, surfaces.clone(), spaces);
+    let Assignment { cells, cost } = assign(scenario, &model, contact, avoided)?;
+    let count = gait.swings.iter().map(Vec::len).sum::<usize>().max(1);
+    Ok((cost / count as f64, gait, cells))
 }

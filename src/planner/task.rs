@@ -9,7 +9,7 @@ use super::problem::{Choice, GaitProblem};
 use super::start;
 use super::steps::Steps;
 use crate::Result;
-use crate::nlp::Model;
+use crate::nlp::{Model, Tighter};
 use crate::robot::Robot;
 use crate::scenario::{GivenMotion, Scenario};
 use crate::terrain::Surfaces;
@@ -29,6 +29,8 @@ pub struct Task<'a> {
     pub surfaces: &'a Surfaces,
     /// A motion to start from, where the scenario gives one.
     pub guess: Option<&'a GivenMotion>,
+    /// By how much limits are tighter than the scenario's.
+    pub tighter: Tighter,
     /// The map over the posture surface, for all formulations but the direct one.
     pub map: Option<&'a WarpMap>,
 }
@@ -46,6 +48,7 @@ impl Task<'_> {
     /// The model with the given state at the start, and with the times at which the guess passes the way-points.
     pub(super) fn completed(&self, mut model: Model) -> Result<Model> {
         start::set(self.scenario, &mut model)?;
+        model.tighter = self.tighter;
         model.visits = BasePath::new(self.scenario, &model)?.visits(self.scenario);
         Ok(model)
     }

@@ -1,14 +1,23 @@
 //! A solve that says why, when no motion is found: which limits would have to give, and with which value of one key of the scenario a motion is
 //! found, if there is one. Each value is tried by a solve.
 
-use super::elastic::Shortfall;
+use std::time::Duration;
+
+use super::elastic::{self, Explanation, Shortfall};
+use super::guess::guess;
+use super::legs;
 use super::motion::Motion;
-use super::solve::{Host, attempt};
+use super::problem::{Choice, GaitProblem};
+use super::solve::{Host, Progress, attempt};
+use super::stage::Stage;
 use super::steps::Steps;
 use super::task::Task;
 use crate::Result;
+use crate::ipopt::INTERRUPT;
 use crate::scenario::{Effort, Scenario};
 
+/// Looking for a reason takes twice as long as the solve at most, or this long if that is more, s.
+const LEAST_SECONDS: u64 = 30;
 /// What is added to what lacks, as a fraction of it.
 const TO_SPARE: f64 = 0.1;
 /// Longer horizons that are tried, as multiples of the scenario's.
@@ -27,19 +36,20 @@ struct Remedy {
     scenario: Scenario,
 }
 
-/// Plans a motion; if none is found and `solver.explain` is on, [`Motion::explanation`] says why.
+/// Says why no motion was found, if that is so and `solver.explain` is on: [`Motion::explanation`].
 ///
 /// # Errors
 /// Those of [`attempt`].
-pub(super) fn attempt_or_explain(task: &Task, host: &mut dyn Host) -> Result<Motion> {
-    let mut motion = attempt(task, host)?;
-    let Some(mut explanation) = motion.explanation.take() else { return Ok(motion) };
+pub(super) fn explain(task: &Task, host: &mut dyn Host, motion: &mut Motion) -> Result<()> {
+    if !task.scenario.solver.explain || motion.solved || motion.interrupted {
+        return Ok(());
+    }
+    let Some(mut explanation) = shortfalls(task, host, motion) else { return Ok(()) };
     for Remedy { key, to, from, mut scenario } in remedies(task.scenario, &explanation.shortfalls) {
         if motion.interrupted || explanation.remedy.is_some() {
             break;
         }
         scenario.solver.effort = Effort::Feasible;
-        scenario.solver.explain = false;
         // Another horizon has other steps, and may be refused.
         let other_steps = if key == "horizon" {
             match Steps::of(&scenario, task.robot, task.surfaces) {
@@ -55,7 +65,29 @@ pub(super) fn attempt_or_explain(task: &Task, host: &mut dyn Host) -> Result<Mot
         explanation.remedy = other.solved.then(|| [key.to_owned(), to, from]);
     }
     motion.explanation = Some(explanation);
-    Ok(motion)
+    Ok(())
+}
+
+/// Which limits would have to give.
+fn shortfalls(task: &Task, host: &mut dyn Host, motion: &mut Motion) -> Option<Explanation> {
+    // The whole problem with second derivatives, whatever was solved last, from the guess: a solve that failed can end anywhere.
+    let Task { scenario, .. } = task;
+    let mut model = task.model().ok()?;
+    let x = guess(scenario, &model, None).ok()?;
+    model.leg_terms = legs::terms(&model, &x, scenario.physics.law).unwrap_or_default();
+    let choice = Choice { with_costs: true, exact_hessian: true };
+    let mut problem = GaitProblem::new(scenario, model, x.clone(), choice);
+    let spent = Duration::try_from_secs_f64(motion.seconds.total).unwrap_or_default();
+    let limit = (2 * spent).max(Duration::from_secs(LEAST_SECONDS));
+    let (before, mut stopped) = (motion.iterations, false);
+    let explanation = elastic::explain(&mut problem, &x, &scenario.solver, limit, &mut |record| {
+        let iteration = before + record.iteration;
+        let flow = host.on_iteration(&Progress { stage: Stage::Why, iteration, record, iterate: None });
+        stopped = flow.is_break();
+        flow
+    });
+    motion.interrupted |= stopped || INTERRUPT.is_raised();
+    explanation
 }
 
 /// What is worth a try: if all that gives belongs to one key, a value of that with a little to spare; else more time, where that may do.

@@ -3,7 +3,7 @@
 use super::format::Scenario;
 use crate::Result;
 use crate::input::{Document, closest};
-use crate::robot::Robot;
+use crate::robot::{Foot, Robot};
 
 /// Refuses ranges of the posture, forces and footholds that no motion can have.
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: Option<&Robot>) -> Result<()> {
@@ -119,8 +119,11 @@ fn keep_out_key(scenario: &Scenario, n: usize) -> String {
 /// Places along each side of a reach box at which a foot may stand.
 const BOX_SAMPLES: i32 = 8;
 
-/// Every foot has a place to stand outside of the polygons, at the start, and at the goal where the heading there is known.
-fn kept_free(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
+/// Headings that are tried where none is given.
+const HEADINGS: usize = 16;
+
+/// Every foot has a place to stand outside of the polygons: at the start, at way-points and at the goal, with some heading where none is given.
+fn kept_free<'r>(document: &Document, scenario: &Scenario, robot: &'r Robot) -> Result<()> {
     let radius = robot.foot_radius();
     let within = |place: [f64; 2]| scenario.keep_out.iter().position(|spec| spec.distance(place) < radius);
     for (e, [x, y, _]) in
@@ -134,30 +137,51 @@ fn kept_free(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<
         }
     }
     let goal_yaw = scenario.goal_yaw().or(scenario.stops().is_empty().then(|| scenario.start_yaw()));
-    let ends = [
-        ("start.position", scenario.start.position, Some(scenario.start_yaw())),
-        ("goal.position", scenario.goal.position, goal_yaw),
+    let all = robot.feet.len();
+    let mut places = vec![
+        ("start.position".to_owned(), scenario.start.position, Some(scenario.start_yaw()), 0.0, all),
+        ("goal.position".to_owned(), scenario.goal.position, goal_yaw, 0.0, all),
     ];
-    for (key, [x, y], yaw) in ends {
-        let Some((sin, cos)) = yaw.map(f64::sin_cos) else { continue };
-        for foot in &robot.feet {
-            let steps = -BOX_SAMPLES..=BOX_SAMPLES;
+    // Half of the feet may be in the air on the way.
+    places.extend(scenario.goal.waypoints.iter().enumerate().map(|(n, waypoint)| {
+        let beside = if waypoint.time.is_some() { 0.0 } else { scenario.goal.waypoint_distance };
+        (format!("goal.waypoints[{n}].position"), waypoint.position, waypoint.yaw, beside, all.div_ceil(2))
+    }));
+    for (key, [x, y], yaw, beside, standing) in places {
+        // The base may pass this far beside the place, and its feet as much.
+        let within = |place: [f64; 2]| {
+            scenario.keep_out.iter().position(|spec| spec.distance(place) < radius - beside)
+        };
+        let samples = || -BOX_SAMPLES..=BOX_SAMPLES;
+        // What is in the way of a foot that finds no place.
+        let blocked = |foot: &Foot, heading: f64| {
+            let (sin, cos) = heading.sin_cos();
             let along = |c: usize, n: i32| {
                 foot.reach.center[c] + foot.reach.half_size[c] * f64::from(n) / f64::from(BOX_SAMPLES)
             };
-            let places = steps.clone().flat_map(|i| steps.clone().map(move |j| (i, j))).map(|(i, j)| {
+            let places = samples().flat_map(|i| samples().map(move |j| (i, j))).map(|(i, j)| {
                 let (u, v) = (along(0, i), along(1, j));
                 [x + cos * u - sin * v, y + sin * u + cos * v]
             });
-            let blocked: Option<Vec<usize>> = places.map(within).collect();
-            if let Some(n) = blocked.and_then(|polygons| polygons.first().copied()) {
-                let polygon = document.place(&keep_out_key(scenario, n));
-                let what = format!(
-                    "given [{x}, {y}], where foot {} finds no place to stand: all that it reaches is kept free of feet ({polygon})",
-                    foot.name
-                );
-                return Err(document.error(key, what));
-            }
+            let polygons: Option<Vec<usize>> = places.map(within).collect();
+            polygons?.first().copied()
+        };
+        // The first of the feet that find no place, if too few find one.
+        let too_few = |heading: f64| {
+            let blocked = |foot: &'r Foot| Some((foot, blocked(foot, heading)?));
+            let blocked: Vec<_> = robot.feet.iter().filter_map(blocked).collect();
+            blocked.first().copied().filter(|_| all - blocked.len() < standing)
+        };
+        let any = (0..HEADINGS).map(|n| n as f64 / HEADINGS as f64 * std::f64::consts::TAU);
+        let headings: Vec<f64> = yaw.map_or_else(|| any.collect(), |yaw| vec![yaw]);
+        let refused: Option<Vec<_>> = headings.into_iter().map(too_few).collect();
+        if let Some((foot, n)) = refused.and_then(|refused| refused.first().copied()) {
+            let polygon = document.place(&keep_out_key(scenario, n));
+            let what = format!(
+                "given [{x}, {y}], where foot {} finds no place to stand: all that it reaches is kept free of feet ({polygon})",
+                foot.name
+            );
+            return Err(document.error(&key, what));
         }
     }
     Ok(())

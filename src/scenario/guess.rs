@@ -83,6 +83,17 @@ impl GivenMotion {
         Ok(motion)
     }
 
+    /// From samples at times that increase from 0, with unit quaternions of which neighbors have the same sign; feet and forces by foot.
+    pub fn from_samples(
+        t: Vec<f64>,
+        base: Vec<[f64; 3]>,
+        quaternion: Vec<[f64; 4]>,
+        feet: Vec<Vec<[f64; 3]>>,
+        forces: Vec<Vec<[f64; 3]>>,
+    ) -> Self {
+        Self { t, base, quaternion, feet, forces: Some(forces) }
+    }
+
     /// Position and quaternion w, x, y, z (not unit) of the base at a time, linear between the frames.
     pub fn base(&self, t: f64) -> ([f64; 3], [f64; 4]) {
         (self.between(&self.base, t), self.between(&self.quaternion, t))

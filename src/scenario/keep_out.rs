@@ -52,7 +52,7 @@ impl KeepOutSpec {
     }
 
     /// The key that gives it.
-    pub(super) fn key(&self) -> &'static str {
+    pub fn key(&self) -> &'static str {
         if self.outlines.is_empty() { "polygon" } else { "mask" }
     }
 

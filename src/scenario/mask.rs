@@ -136,6 +136,12 @@ impl Mask {
             )));
         }
         let numbers = npy::numbers(dtype, elements).unwrap_or_default();
+        let nans = numbers.iter().filter(|number| number.is_nan()).count();
+        if nans > 0 {
+            return Err(Error::input(format!(
+                "has {nans} elements that are NaN; write 0 where feet may stand, and 1 where not"
+            )));
+        }
         let (columns, rows) = (columns as usize, rows as usize);
         let at = |n: usize| if header.fortran_order { n % columns * rows + n / columns } else { n };
         let kept = (0..numbers.len()).map(|n| numbers[at(n)] != 0.0).collect();

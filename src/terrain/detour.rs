@@ -12,7 +12,8 @@ use super::contact::ContactGround;
 use super::keep_out::KeepOut;
 use crate::heightfield::{Grid, Heightfield};
 use crate::robot::Robot;
-use crate::scenario::Scenario;
+use crate::scenario::{GaitKind, KeepOutSpec, Scenario, SectionSpec};
+use crate::{Error, Result};
 
 /// Distance of the nodes, m, for a robot of ANYmal's size; more where there would be more than [`MOST_NODES`].
 const SPACING: f64 = 0.08;
@@ -22,6 +23,9 @@ const MOST_NODES: f64 = 60_000.0;
 const WITHIN_REACH: f64 = 0.8;
 /// … and the border of the ground is this far, as a fraction of the distance of its feet from its middle.
 const FROM_BORDER: f64 = 1.0;
+/// If no foot can stand within this, as a fraction of that half size, the robot does not get over a place without a jump: a foot would land
+/// beyond it while another one still stands on this side, each in its box.
+const OUT_OF_REACH: f64 = 2.0;
 /// Half the side of the square around a place that counts as its surroundings, as a fraction of that distance.
 const SURROUNDINGS: f64 = 1.0;
 /// What an edge costs more where no foot can stand in its surroundings, as a multiple of its length.
@@ -42,13 +46,16 @@ struct Search {
 }
 
 /// The bends of a scenario's way; all empty where it can go straight, where nothing leads around either, and for a robot that cannot turn.
+///
+/// # Errors
+/// [`Error::Key`] if what is kept free of feet leaves no way, not even over the border of the ground, to a robot that does not jump.
 pub(super) fn bends(
     scenario: &Scenario,
     robot: &Robot,
     ground: &Heightfield,
     contact: Option<&ContactGround>,
     keep_out: Option<&KeepOut>,
-) -> Bends {
+) -> Result<Bends> {
     let stops = scenario.stops();
     let places: Vec<[f64; 2]> = std::iter::once(scenario.start.position)
         .chain(stops.iter().map(|stop| stop.position))
@@ -57,16 +64,57 @@ pub(super) fn bends(
     let straight = vec![Vec::new(); places.len() - 1];
     let max_slope = steepest(scenario);
     let everywhere = contact.is_none() && keep_out.is_none() && is_below(ground, max_slope);
-    if !scenario.goal.detours || robot.is_sagittal() || everywhere {
-        return straight;
+    if everywhere {
+        return Ok(straight);
+    }
+    if let Some(keep_out) = keep_out {
+        ensure_way(scenario, robot, ground.extent(), keep_out, &places)?;
+    }
+    if !scenario.goal.detours || robot.is_sagittal() {
+        return Ok(straight);
     }
     let stands = |place: [f64; 2]| {
         let [x, y] = ground.gradient(place[0], place[1]);
         contact.map_or_else(|| x.hypot(y) <= max_slope, |c| c.is_steppable(place))
             && keep_out.is_none_or(|keep_out| keep_out.allows(place))
     };
-    let Ok(search) = Search::new(robot, ground.extent(), stands) else { return straight };
-    places.windows(2).map(|ends| search.around([ends[0], ends[1]])).collect()
+    let Ok(search) = Search::new(robot, ground.extent(), [WITHIN_REACH, FROM_BORDER], stands) else {
+        return Ok(straight);
+    };
+    Ok(places.windows(2).map(|ends| search.around([ends[0], ends[1]])).collect())
+}
+
+/// Refuses polygons between two stops that are too wide to be stepped over and leave no way around.
+fn ensure_way(
+    scenario: &Scenario,
+    robot: &Robot,
+    extent: [f64; 4],
+    keep_out: &KeepOut,
+    places: &[[f64; 2]],
+) -> Result<()> {
+    let jumps = |section: &SectionSpec| section.kind.flies() || section.duty.is_some_and(|duty| duty < 0.5);
+    if scenario.gait.kind == GaitKind::Custom || scenario.gait.sections().iter().any(jumps) {
+        return Ok(());
+    }
+    let Ok(search) = Search::new(robot, extent, [OUT_OF_REACH, 0.0], |place| keep_out.allows(place)) else {
+        return Ok(());
+    };
+    for ends in places.windows(2).map(|ends| [ends[0], ends[1]]) {
+        if search.line(ends).is_some() || search.shortest(ends).is_some() {
+            continue;
+        }
+        let on_line = |k: usize| [0, 1].map(|c| ends[0][c] + k as f64 / 100.0 * (ends[1][c] - ends[0][c]));
+        let deepest =
+            |spec: &KeepOutSpec| (0..=100).map(|k| spec.distance(on_line(k))).fold(f64::INFINITY, f64::min);
+        let depths: Vec<f64> = scenario.keep_out.iter().map(deepest).collect();
+        let n = (0..depths.len()).min_by(|&a, &b| depths[a].total_cmp(&depths[b])).unwrap_or(0);
+        let [[ax, ay], [bx, by]] = ends;
+        let what = format!(
+            "leaves no way from [{ax}, {ay}] to [{bx}, {by}]: it is too wide to be stepped over, and reaches from border to border of the ground or around one of them; make it smaller, or choose another start or goal"
+        );
+        return Err(Error::key(format!("keep_out[{n}].{}", scenario.keep_out[n].key()), what));
+    }
+    Ok(())
 }
 
 /// The steepest ground that counts as walkable.
@@ -87,7 +135,13 @@ fn is_below(ground: &Heightfield, slope: f64) -> bool {
 }
 
 impl Search {
-    fn new(robot: &Robot, extent: [f64; 4], stands: impl Fn([f64; 2]) -> bool) -> crate::Result<Self> {
+    /// With what is given as [`WITHIN_REACH`] and [`FROM_BORDER`].
+    fn new(
+        robot: &Robot,
+        extent: [f64; 4],
+        [within_reach, from_border]: [f64; 2],
+        stands: impl Fn([f64; 2]) -> bool,
+    ) -> Result<Self> {
         let [x_min, x_max, y_min, y_max] = extent;
         let area = (x_max - x_min) * (y_max - y_min);
         let grid = Grid::fitted(extent, (robot.size() * SPACING).max((area / MOST_NODES).sqrt()))?;
@@ -116,12 +170,12 @@ impl Search {
             let [x, y] = place(n);
             let border = (x - x_min).min(x_max - x).min(y - y_min).min(y_max - y);
             let (mut near, mut all, mut closed) = (false, 0.0, 0.0);
-            within(n, (SURROUNDINGS * feet).max(WITHIN_REACH * half_size), &mut |m, distance| {
-                near |= standable[m] && distance <= WITHIN_REACH * half_size;
+            within(n, (SURROUNDINGS * feet).max(within_reach * half_size), &mut |m, distance| {
+                near |= standable[m] && distance <= within_reach * half_size;
                 all += 1.0;
                 closed += f64::from(u8::from(!standable[m]));
             });
-            open.push(near && border >= FROM_BORDER * feet);
+            open.push(near && border >= from_border * feet);
             cost.push(1.0 + CROWDED * closed / all);
         }
         Ok(Self { grid, open, cost })
@@ -221,7 +275,7 @@ mod tests {
     use super::*;
     use crate::robot::RobotSpec;
 
-    fn bends_of(keep_out: &str) -> Bends {
+    fn bends_of(keep_out: &str) -> Result<Bends> {
         let text = format!(
             "[terrain]\nkind = \"flat\"\nextent = [-2.0, 2.0, -2.0, 2.0]\n[start]\nposition = [-1.2, 0.0]\n[goal]\nposition = [1.2, 0.0]\n\
              [[goal.waypoints]]\nposition = [1.2, -0.4]\n{keep_out}"
@@ -241,14 +295,20 @@ mod tests {
                 "[[keep_out]]\npolygon = [[-{half}, -0.6], [{half}, -0.6], [{half}, 0.9], [-{half}, 0.9]]\n"
             )
         };
-        assert_eq!(bends_of(&square(0.02)), [Vec::<[f64; 2]>::new(), vec![]]);
-        let around = bends_of(&square(0.4));
+        let straight = [Vec::<[f64; 2]>::new(), vec![]];
+        assert_eq!(bends_of(&square(0.02)).expect("a way"), straight);
+        let around = bends_of(&square(0.4)).expect("a way");
         assert!((1..=4).contains(&around[0].len()) && around[1].is_empty(), "{around:?}");
         // Below, where the way is shorter; and not close to it.
         assert!(around[0].iter().all(|[_, y]| *y < -0.6), "{around:?}");
-        // A wall from border to border has no way around.
+        // A wall from border to border has no way around; a robot that jumps may get over it.
         let wall = "[[keep_out]]\npolygon = [[-0.4, -3.0], [0.4, -3.0], [0.4, 3.0], [-0.4, 3.0]]\n";
-        assert_eq!(bends_of(wall), [Vec::<[f64; 2]>::new(), vec![]]);
+        let error = bends_of(wall).expect_err("no way").to_string();
+        assert!(
+            error.starts_with("keep_out[0].polygon: leaves no way from [-1.2, 0] to [1.2, -0.4]"),
+            "{error}"
+        );
+        assert_eq!(bends_of(&format!("{wall}[gait]\nkind = \"pronk\"\n")).expect("a jump"), straight);
     }
 
     #[test]
@@ -262,7 +322,7 @@ mod tests {
             // A hill with steep flanks, 1.2 m wide.
             let hill = |x: f64, y: f64| Ok(height / (1.0 + ((x * x + y * y) / 0.36).powi(4)));
             let ground = Heightfield::from_function([-3.0, 3.0, -3.0, 3.0], 0.05, hill).expect("a ground");
-            bends(&scenario, &robot, &ground, None, None)
+            bends(&scenario, &robot, &ground, None, None).expect("a way")
         };
         assert!(bends_of(0.1, "") == [Vec::<[f64; 2]>::new()]);
         let around = bends_of(1.5, "");

@@ -30,6 +30,12 @@ impl Patch {
         self.axes().map(|axis| axis[0] * d[0] + axis[1] * d[1])
     }
 
+    /// Whether a place is on the rectangle, seen from above.
+    pub fn covers(&self, place: [f64; 2]) -> bool {
+        let at = self.coordinates(place);
+        (0..2).all(|c| (self.sides[c][0]..=self.sides[c][1]).contains(&at[c]))
+    }
+
     /// The point of the rectangle that is nearest to a place, seen from above, m.
     pub fn nearest(&self, place: [f64; 2]) -> [f64; 2] {
         let at = self.coordinates(place);

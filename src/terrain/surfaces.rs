@@ -85,7 +85,7 @@ impl Surfaces {
     /// The surfaces of a scenario.
     ///
     /// # Errors
-    /// If no foot can stand anywhere.
+    /// If no foot can stand anywhere, or what is kept free leaves no way.
     pub fn of(scenario: &Scenario, robot: &Robot, ground: &Ground) -> Result<Self> {
         let field = &ground.field;
         let keep_out = KeepOut::of(scenario, field.extent(), robot.size(), robot.foot_radius())?;
@@ -93,7 +93,7 @@ impl Surfaces {
             Footholds::Anywhere => Self::one(Arc::new(field.clone())),
             Footholds::Patches => Self::with_edges(&scenario.contact, robot, ground, keep_out.as_ref())?,
         };
-        let bends = bends(scenario, robot, field, surfaces.contact.as_deref(), keep_out.as_ref());
+        let bends = bends(scenario, robot, field, surfaces.contact.as_deref(), keep_out.as_ref())?;
         Ok(Self { keep_out, bends: Arc::new(bends), ..surfaces })
     }
 

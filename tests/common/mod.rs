@@ -11,7 +11,7 @@ use warpgait::heightfield::Heightfield;
 use warpgait::pipeline::Prepared;
 use warpgait::plan::sampled::Provenance;
 use warpgait::plan::{GroundGrid, Meta, MetaRobot, MetaSolver, Plan};
-use warpgait::planner::{Host, Motion, Progress, Seconds, solve};
+use warpgait::planner::{Host, Motion, Progress, Seconds, attempt, explain};
 use warpgait::robot::{Robot, RobotSpec};
 use warpgait::scenario::{Formulation, Scenario, load_text};
 use warpgait::trajectory::spline::{SwingShape, swing_basis};
@@ -43,7 +43,8 @@ pub fn solved_in(folder: &Path, text: &str) -> (Motion, Plan) {
     let build = || warp::build(&prepared.surfaces.posture, &scenario.map, &mut |_| ControlFlow::Continue(()));
     let map = (scenario.formulation() != Formulation::Direct).then(|| build().expect("a map").0);
     let task = prepared.task(&loaded, map.as_ref());
-    let motion = solve(&task, &mut Patient(scenario)).expect("a motion");
+    let mut motion = attempt(&task, &mut Patient(scenario)).expect("a motion");
+    explain(&task, &mut Patient(scenario), &mut motion).expect("a reason");
     let provenance = Provenance { loaded: &loaded, ground: &prepared.ground, map_seconds: 0.0 };
     let plan = Plan::from_motion(&motion, &provenance);
     (motion, plan)
