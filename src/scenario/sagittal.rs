@@ -12,8 +12,10 @@ use crate::robot::Robot;
 /// How far a place may be beside the line, m, and a heading off, rad.
 const BESIDE: f64 = 1e-3;
 const TURNED: f64 = 1e-3;
+/// How fast the base may move to the side at the end, m/s.
+const ASIDE: f64 = 1e-3;
 
-/// Refuses a goal, a way-point or a heading off the straight line.
+/// Refuses a goal, a way-point, a heading or a velocity off the straight line.
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {
     if !robot.is_sagittal() {
         return Ok(());
@@ -58,6 +60,13 @@ pub(super) fn check(document: &Document, scenario: &Scenario, robot: &Robot) -> 
             );
         }
     }
+    if let Some([u, v]) = goal.velocity.filter(|[u, v]| (cos * v - sin * u).abs() > ASIDE) {
+        let what = format!(
+            "given [{u}, {v}], of which {:.3} m/s is to the side of the heading at the start, {heading:.4} rad",
+            (cos * v - sin * u).abs()
+        );
+        return refuse("goal.velocity", what);
+    }
     Ok(())
 }
 
@@ -81,6 +90,11 @@ mod tests {
             ("yaw = 0.0", "", "s.toml:9: goal.position: given [0.3, 0.3], 0.300 m beside the line"),
             ("", "yaw = 0.0", "s.toml:10: goal.yaw: given 0, the heading at the start is 0.7854 rad"),
             ("", "turns = 1", "s.toml:10: goal.turns: given 1"),
+            (
+                "",
+                "velocity = [0.2, 0.0]",
+                "s.toml:10: goal.velocity: given [0.2, 0], of which 0.141 m/s is to the side",
+            ),
             ("", "circle = { center = [0.0, 0.3] }", "s.toml:10: goal.circle: given"),
             ("", &stop("position = [0.1, 0.3]"), "goal.position: given [0.3, 0.3], 0.190 m beside the line"),
             (
@@ -103,6 +117,7 @@ mod tests {
             ("", ""),
             ("yaw = -2.35619449", ""), // backward
             ("", "yaw = 0.7853981634"),
+            ("", "velocity = [0.2, 0.2]"),
             ("yaw = 0.7853981634", "[[goal.waypoints]]\nposition = [0.12, 0.16]"),
         ] {
             of("solo8", &way(start, goal)).expect(goal);
