@@ -62,7 +62,10 @@ fn defaults_are_those_of_the_format() {
 
 #[test]
 fn a_gait_with_flight_has_a_finer_time_step() {
-    let step = |gait: &str| parse("s.toml", &with("kind = \"trot\"", gait)).unwrap().time_step;
+    let step = |gait: &str| {
+        let text = with("kind = \"trot\"", gait);
+        load_text("s.toml", &text, Path::new("."), &[]).unwrap().scenario.time_step
+    };
     assert_eq!(step("kind = \"flying-trot\""), 0.025);
     assert_eq!(step("kind = \"bound\"\nduty = 0.4"), 0.025);
     assert_eq!(step("kind = \"bound\"\nduty = 0.5"), 0.05);
