@@ -138,6 +138,9 @@ fn print_tables(planned: &Planned, tolerance: f64, console: &Console) {
     console.result(&format!("{}\n", report::check_table(&planned.check, console.has_color())));
 }
 
+/// Laws that say something of the ground itself, which a smaller time step does not change.
+const OF_THE_GROUND: [&str; 2] = ["ground_moved", "unknown_ground"];
+
 fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
     let (motion, solver) = (&planned.motion, &planned.plan.meta.solver);
     let [total, map, evaluation, linear] =
@@ -148,11 +151,12 @@ fn summary(planned: &Planned, output: &Path, seconds: f64) -> String {
     // The laws hold at the samples of the solver; what fails, fails between them.
     let advice = match failing {
         Some(row) if motion.solved => format!(
-            "\nThe first that fails: {} is {} {}, allowed {}. A smaller time_step often helps.",
+            "\nThe first that fails: {} is {} {}, allowed {}.{}",
             row.name,
             report::number(row.value),
             row.unit,
-            report::number(row.limit)
+            report::number(row.limit),
+            if OF_THE_GROUND.contains(&row.name.as_str()) { "" } else { " A smaller time_step often helps." }
         ),
         _ => String::new(),
     };

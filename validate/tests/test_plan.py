@@ -49,6 +49,14 @@ def with_nan(array: Any) -> Any:
     return array
 
 
+def robot(**changes: Any) -> Callable[[Any], Any]:
+    def change(text: Any) -> Any:
+        found = json.loads(str(text))
+        return np.array(json.dumps(found | {"robot": found["robot"] | changes}))
+
+    return change
+
+
 def meta(**changes: Any) -> Callable[[Any], Any]:
     return lambda text: np.array(json.dumps(json.loads(str(text)) | changes))
 
@@ -58,6 +66,7 @@ def meta(**changes: Any) -> Callable[[Any], Any]:
     [
         (lambda a: a.pop("foot_force"), ["foot_force", "missing"]),
         (poke("foot_force", with_nan), ["foot_force", "not finite", "[0, 2, 1]"]),
+        (poke("heightfield", lambda x: x + 1e300), ["heightfield", "beyond 1e+09"]),
         (poke("base_position", lambda x: x[:-1]), ["base_position", "shape"]),
         (poke("base_position", lambda x: x.astype(np.float32)), ["base_position", "float32"]),
         (poke("foot_contact", lambda x: x.astype(float)), ["foot_contact", "bool"]),
@@ -69,6 +78,7 @@ def meta(**changes: Any) -> Callable[[Any], Any]:
         (poke("meta", meta(schema="one")), ["schema"]),
         (poke("meta", meta(robot={"name": "anymal_b"})), ["robot", "mass"]),
         (poke("meta", meta(robot=[])), ["robot"]),
+        (poke("meta", robot(friction=1e300)), ["robot", "friction is 1e+300", "at most 10"]),
         (adhesive(limits={}), ["meta", "limits.pull_limit", "solve it again"]),
         (adhesive(limits={"pull_limit": "strong"}), ["limits.pull_limit", "strong"]),
     ],

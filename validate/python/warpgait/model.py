@@ -72,7 +72,8 @@ def find_model(name: str) -> Path:
     known = ", ".join(available_models()) or "none (set WARPGAIT_ROBOTS to the folder that holds them)"
     raise InputError(
         f'robot "{name}" has no full model (robots/{name}.xml). Available models: {known}. '
-        "Plan for one of these, or name a model to replay on with --model (its mass and legs will differ from the plan's)."
+        f"Plan for one of these, or set WARPGAIT_ROBOTS to the folder of {name}.xml; `warpgait validate` also takes a model to replay on "
+        "with --model (if it is of another robot, its mass and legs differ from the plan's)."
     )
 
 

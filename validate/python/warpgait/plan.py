@@ -20,7 +20,7 @@ from .archive import Archive
 from .arrays import Array, Bools, runs
 from .errors import InputError
 from .geometry import smootherstep
-from .settings import CELL
+from .settings import CELL, GREATEST_FRICTION
 from .text import is_name
 
 SCHEMA = 1
@@ -30,6 +30,7 @@ _UNIFORM = 1e-6  # of the mean step, by which the steps of `t` may differ
 _START = 1e-9  # s, of the first time
 _SHORTEST, LONGEST = 0.1, 600.0  # s, what a plan may last, as in a scenario
 _MOST_CELLS = 2e7  # of the ground as it is replayed: cells of 2.5 cm over 110 m by 110 m
+LARGEST = 1e9  # in SI units, of any number in a member, as for the law `magnitude` of the check
 _UNIT = 1e-6  # of the length of a unit vector or quaternion
 
 # Shape of every member that a replay needs: N samples, E feet, R rows along y, C columns along x.
@@ -182,6 +183,9 @@ class _Checker:
         bad = np.argwhere(~np.isfinite(array))
         if len(bad):
             raise self.fail(member, f"has a value that is not finite at {bad[0].tolist()}")
+        bad = np.argwhere(abs(array) > LARGEST)
+        if len(bad):
+            raise self.fail(member, f"has a value at {bad[0].tolist()} beyond {LARGEST:g}, which no motion has")
         return array.astype(np.float64)
 
     def bools(self, member: str, shape: tuple[str | int, ...]) -> Bools:
@@ -231,6 +235,8 @@ def _robot(check: _Checker, meta: dict[str, Any]) -> PlannedRobot:
         raise check.fail("meta", "robot: inertia must be 3x3 and gravity a vector of 3, all finite")
     if result.mass <= 0 or result.friction <= 0 or not result.gravity.any():
         raise check.fail("meta", "robot: mass and friction must be positive, and gravity must not be zero")
+    if result.friction > GREATEST_FRICTION:
+        raise check.fail("meta", f"robot: friction is {result.friction:g}, allowed: at most {GREATEST_FRICTION:g}")
     return result
 
 

@@ -20,6 +20,7 @@ MUJOCO_VERSION = "3.17.0"
 PHYSICS_RATES = (500.0, 1000.0)  # Hz, time steps of the simulation; a verdict holds with both
 CELL = 0.025  # m: a coarser terrain is refined to this before MuJoCo cuts it into prisms
 LOWEST_CONTROL_RATE = 50.0  # Hz, the least that is accepted
+GREATEST_FRICTION = 10.0  # of a ground
 
 
 def _refuse(name: str, value: float, expected: str) -> InputError:
@@ -55,8 +56,8 @@ class Disturbance:
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         _require_finite(self)
-        if self.friction is not None and not 0 < self.friction <= 10:
-            raise _refuse("friction", self.friction, "in (0, 10]")
+        if self.friction is not None and not 0 < self.friction <= GREATEST_FRICTION:
+            raise _refuse("friction", self.friction, f"in (0, {GREATEST_FRICTION:g}]")
         if not 0.1 <= self.mass_factor <= 10:
             raise _refuse("mass_factor", self.mass_factor, "in [0.1, 10]")
         if not 0.1 <= self.body_factor <= 10:
