@@ -304,7 +304,7 @@ impl<'a> Solve<'a> {
             if round > LEG_ROUNDS || left == 0 {
                 let percent = 100.0 * change.rms / LEVER;
                 end.status = format!(
-                    "{}; the torques of the legs' mass have not settled, by {percent:.2} % of m g · 0.3 m",
+                    "{}; the torques of the legs' mass have not converged, by {percent:.2} % of m g · 0.3 m",
                     end.status
                 );
                 break;

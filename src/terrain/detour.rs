@@ -12,7 +12,7 @@ use super::contact::ContactGround;
 use super::keep_out::KeepOut;
 use crate::heightfield::{Grid, Heightfield};
 use crate::robot::Robot;
-use crate::scenario::{GaitKind, KeepOutSpec, Scenario, SectionSpec};
+use crate::scenario::{GaitKind, KeepOutSpec, Scenario};
 use crate::{Error, Result};
 
 /// Distance of the nodes, m, for a robot of ANYmal's size; more where there would be more than [`MOST_NODES`].
@@ -92,8 +92,7 @@ fn ensure_way(
     keep_out: &KeepOut,
     places: &[[f64; 2]],
 ) -> Result<()> {
-    let jumps = |section: &SectionSpec| section.kind.flies() || section.duty.is_some_and(|duty| duty < 0.5);
-    if scenario.gait.kind == GaitKind::Custom || scenario.gait.sections().iter().any(jumps) {
+    if scenario.gait.kind == GaitKind::Custom || scenario.gait.flies() {
         return Ok(());
     }
     let Ok(search) = Search::new(robot, extent, [OUT_OF_REACH, 0.0], |place| keep_out.allows(place)) else {

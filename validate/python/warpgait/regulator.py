@@ -18,7 +18,7 @@ TAIL = 1.0  # s, for which the robot stands on after the plan's end
 FORCE_COST = (
     0.02  # of a change of a foot's force, as a fraction of what the foot bears, against the accelerations that forces cause
 )
-LEAST_SHARE = 0.02  # of the weight, that a foot bears at least in this comparison
+LEAST_LOAD = 0.02  # of the weight, that a foot bears at least in this comparison
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Regulator:
 
         ∫ s (c·c + ℓ² θ·θ) + d (ċ·ċ + ℓ² ω·ω) + a·a + ℓ² α·α + ε Σ (u·u / m²) / ρ² dt,
 
-    where a and α are the accelerations that u causes, ℓ is the lever, and ρ the share of the weight that the plan gives the foot: one that
+    where a and α are the accelerations that u causes, ℓ is the lever, and ρ the fraction of the weight that the foot bears in the plan: one that
     bears little can neither push nor pull. With s = k² and d = k_d² − 2 k, an error that the feet can correct at once has the stiffness k and
     the damping k_d. Where legs move in planes of the base, contacts hold what the motors do not move, and every acceleration counts as free.
     """
@@ -88,8 +88,8 @@ def _linearized(reference: Reference, at: Integers, body: Body) -> tuple[Array, 
     caused = np.zeros((len(at), 6, force.shape[1], 3))
     caused[:, :3] = np.eye(3)[None, :, None] / body.mass
     caused[:, 3:] = np.moveaxis(inverse[:, None] @ _cross(arms), 1, 2)
-    share = np.maximum((force * normal).sum(-1) / (body.mass * body.gravity), LEAST_SHARE)
-    costs = np.repeat(FORCE_COST / (share * body.mass) ** 2, 3, axis=-1)
+    load = np.maximum((force * normal).sum(-1) / (body.mass * body.gravity), LEAST_LOAD)
+    costs = np.repeat(FORCE_COST / (load * body.mass) ** 2, 3, axis=-1)
     return own, caused.reshape(len(at), 6, -1), costs
 
 

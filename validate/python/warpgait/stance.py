@@ -19,10 +19,8 @@ LEAST_HEIGHT = 0.35  # of the hip above the foot in a keyframe that is taken for
 AT_LIMIT = 0.02  # rad inside its range that a computed stance keeps each joint
 CENTRAL = 0.4  # of half a reach box: how far a foot stands from its middle, along x and y
 REACHED = 1e-5  # m
-_STARTS, _REDUNDANT_STARTS = (
-    6,
-    3,
-)  # of the search along each of two joints; of a leg of more than three, whose others turn as well
+_STARTS = 6  # of the search along each of two joints …
+_REDUNDANT_STARTS = 3  # … and of a leg of more than three joints, whose others turn as well
 
 
 def turned(axis: Array, angle: float) -> Array:
