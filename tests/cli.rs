@@ -1,5 +1,6 @@
 //! The command line: exit codes, one message, no incomplete files.
 
+use std::io::Read;
 use std::path::Path;
 use std::process::Command;
 
@@ -247,6 +248,30 @@ fn validate_runs_python() {
     script(&python, "exit 1");
     let (code, _, err) = validate(&["validate", "a.plan.npz"]);
     assert!(code == 2 && err.contains("WARPGAIT_PYTHON=") && err.contains("does not have"), "{err}");
+}
+
+/// Ctrl-C to this program alone, as from a program that runs it, ends Python in good order.
+#[test]
+fn an_interrupt_is_passed_on_to_python() {
+    let folder = tempfile::tempdir().unwrap();
+    let python = folder.path().join("python");
+    script(
+        &python,
+        "[ \"$2\" = -c ] && echo found && exit 0\ntrap 'echo heard >> heard; exit 130' INT\necho ready\nwhile :; do sleep 0.01; done",
+    );
+    let mut launcher = Command::new(env!("CARGO_BIN_EXE_warpgait"))
+        .current_dir(folder.path())
+        .args(["validate", "a.plan.npz"])
+        .env("WARPGAIT_PYTHON", &python)
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut ready = [0; 6];
+    launcher.stdout.as_mut().unwrap().read_exact(&mut ready).unwrap();
+    let id = launcher.id().to_string();
+    assert!(Command::new("sh").args(["-c", "kill -s INT $0", &id]).status().unwrap().success());
+    assert_eq!(launcher.wait().unwrap().code(), Some(130));
+    assert_eq!(std::fs::read_to_string(folder.path().join("heard")).unwrap(), "heard\n");
 }
 
 /// Whatever lies in the working folder, a clone of the repository for instance, is not taken for the package or for Python.

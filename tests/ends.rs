@@ -322,6 +322,24 @@ fn a_state_that_fails_a_law_is_refused_before_solving() {
             "start.state.height: given 0.42 m, where the torso's underside is",
         ),
         (
+            format!("{}\nswings = [[1e-6, 0.3], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]", lifted(0.05)),
+            "",
+            "start.state.feet[0]: given 0.050 m above the ground 0.000001 s after LF has left it at rest (start.state.swings[0], line 14); allowed: at most",
+        ),
+        (
+            format!(
+                "{}\nswings = [[1e-4, 0.3], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]\nfeet_velocity = [[0.0, 0.0, 2.0], {rest}]",
+                lifted(0.0)
+            ),
+            "",
+            "start.state.feet_velocity[0]: given 2.000 m/s 0.0001 s after LF has left it at rest",
+        ),
+        (
+            "velocity = [3.2, 0.0, 0.0]".to_owned(),
+            "",
+            "start.state.velocity: given [3.2, 0.0, 0.0] m/s, so fast that",
+        ),
+        (
             "velocity = [15.0, 0.0, 0.0]".to_owned(),
             "",
             "start.state.velocity: given [15.0, 0.0, 0.0] m/s, so fast that LF is out of its reach before it lifts off",

@@ -16,6 +16,7 @@ import crawl
 import warpgait
 from warpgait.commands.export import main
 from warpgait.commands.validate import main as validate
+from warpgait.errors import error_report
 from warpgait.motions import FORMATS, motion_of_plan, motion_of_replay
 from warpgait.plan import read_plan
 
@@ -155,6 +156,10 @@ def test_a_report_or_replay_of_another_plan_does_not_count(
     assert "is the replay of another plan" in refused([str(other), "--to", "csv", "--from", "replay"], capsys)
     certificate: Any = motion_of_plan(read_plan(other)).certificate
     assert certificate["replay"]["verdict"] is None and "another version" in certificate["replay"]["note"]
+    report = error_report(other.name, "the replay was interrupted")
+    other.with_name("walk.report.json").write_text(json.dumps(report))
+    certificate = motion_of_plan(read_plan(other)).certificate
+    assert certificate["replay"]["note"] == "the last replay ended with an error: the replay was interrupted"
 
 
 def test_the_certificate_tells_a_bad_plan_from_a_good_one(plan: Path) -> None:

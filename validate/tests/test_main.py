@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,20 @@ def test_ctrl_c_ends_a_solve_within_a_second_with_a_plan(folder: Path) -> None:
     process.communicate(timeout=60)
     assert process.returncode == 130 and time.monotonic() - started < 5.0  # 1 s on an idle machine
     assert (folder / "walk.plan.npz").is_file()
+
+
+@pytest.mark.parametrize("send", [os.kill, os.killpg])
+def test_ctrl_c_interrupts_a_command_of_python_once(walk_plan: Path, tmp_path: Path, send: Callable[[int, int], None]) -> None:
+    """Whether the terminal sends it to both processes, or a program to the one that it started."""
+    words = ["validate", str(walk_plan), "-o", "reports"]
+    process = subprocess.Popen([*COMMAND, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "closed loop" in line:
+            break
+    send(process.pid, signal.SIGINT)
+    assert process.stderr.read().splitlines()[-1:] == ["validate: interrupted"]
+    assert process.wait() == 130 and not list(tmp_path.iterdir())
 
 
 def test_it_starts_without_numpy() -> None:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
+import time
 from collections.abc import Callable
+from types import FrameType
 
 from .children import end_with_parent
 from .errors import InputError
 from .text import visible
 
 ERROR, INTERRUPTED = 2, 130  # exit codes
+_ONE_CTRL_C = 0.5  # s, within which it comes from the terminal and from the program that started this one
 
 
 class OutputError(Exception):
@@ -62,9 +66,25 @@ def keep_standard_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
 
 
+def _count_ctrl_c_once() -> None:
+    """Ctrl-C from the terminal and passed on (`src/cli/python.rs`) interrupts once. Where SIGINT is ignored, it stays so."""
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return
+    last = -_ONE_CTRL_C
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        nonlocal last
+        before, last = last, time.monotonic()
+        if last - before > _ONE_CTRL_C:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+
+
 def run(main: Callable[[], int]) -> int:
     """Run a command; returns its exit code, or 2 if its output cannot be written. It ends with the program that started it."""
     end_with_parent()
+    _count_ctrl_c_once()
     keep_standard_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -76,6 +96,8 @@ def run(main: Callable[[], int]) -> int:
         return ERROR
     except SystemExit as end:  # of argparse
         code = end.code if isinstance(end.code, int) else ERROR
+    if code == INTERRUPTED:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # it may still be passed on
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

@@ -11,8 +11,8 @@ import argparse
 import json
 import sys
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -184,9 +184,8 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
 
     loaded = cycles.repeated(plan.read_plan(options.plan), options.repeat)
     if not options.no_files:
-        _make_folder(folder)
         ensure_outputs(_outputs(options, folder), _inputs(options))
-        _replace_reports(options, folder, UNFINISHED, only_old=True)
+        _replace_reports(options, folder, UNFINISHED)
     found = validation.validate(loaded, settings, say)
     if not options.no_files:
         _write(options, folder, found, say)
@@ -194,13 +193,23 @@ def _run(options: argparse.Namespace, settings: Settings, folder: Path) -> int:
     return TRACKABLE if found.trackable else NOT_TRACKABLE
 
 
-def _make_folder(folder: Path) -> None:
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """With this folder for the reports. If nothing is written into a new one, it goes away again."""
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"{folder}: cannot make this folder for the reports ({error.strerror}); name another with --output"
         ) from error
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for path in new:
+                path.rmdir()
+        raise
 
 
 def _outputs(options: argparse.Namespace, folder: Path) -> list[Path]:
@@ -274,7 +283,8 @@ def main(words: list[str] | None = None) -> int:
         _print_error(options, str(error))
         return ERROR
     try:
-        return _run(options, settings, folder)
+        with nullcontext() if options.no_files else _made(folder):
+            return _run(options, settings, folder)
     except OutputError as error:  # the files are written
         complain(error)
         return ERROR
@@ -287,8 +297,7 @@ def main(words: list[str] | None = None) -> int:
         traceback.print_exc()
         message, code = "the replay itself failed; please report this with the plan", ERROR
     if not options.no_files and folder.is_dir():
-        # A plan that is not there gets no report; one that was there has one.
-        _replace_reports(options, folder, message, only_old=code == INTERRUPTED or not options.plan.is_file())
+        _replace_reports(options, folder, message)
     if code == ERROR:
         _print_error(options, message)
     return code
@@ -300,13 +309,13 @@ def _print_error(options: argparse.Namespace, message: str) -> None:
         emit(json.dumps(error_report(options.plan.name, message)))
 
 
-def _replace_reports(options: argparse.Namespace, folder: Path, message: str, only_old: bool) -> None:
+def _replace_reports(options: argparse.Namespace, folder: Path, message: str) -> None:
     """Reports that say why there is no verdict, in place of those of an earlier run, as far as they can be written at all."""
     name = options.plan.name
     texts = json.dumps(error_report(name, message), indent=2, ensure_ascii=False) + "\n", error_page(name, message)
     for end, text in zip(REPORTS, texts, strict=True):
         report = folder / f"{stem_of(options.plan)}{end}"
-        if report.exists() or (end == REPORTS[0] and not only_old):
+        if report.exists():
             with suppress(InputError, OSError):
                 ensure_outputs([report], _inputs(options))
                 write_text(report, text)

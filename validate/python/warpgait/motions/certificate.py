@@ -56,6 +56,8 @@ def report_of(plan: Plan) -> Report:
         if path.stat().st_size > _MOST_REPORT:
             raise ValueError("too large")
         found = json.loads(path.read_text())
+        if found["verdict"] == "error":
+            return Report(note=f"the last replay ended with an error: {found['error']}")
         if found.get("plan_sha256") != plan.sha256:
             return Report(note="the report is of another version of the plan")
         if found["verdict"] not in ("pass", "marginal", "fail"):
