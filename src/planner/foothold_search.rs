@@ -12,7 +12,7 @@
 //! - what the step is longer or higher than the leg can take;
 //! - the roughness of the ground under the foot, and a little for each direction in which the ground next to it cannot be stood on.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::{Vector2, Vector3};
 
@@ -283,12 +283,18 @@ impl<'a> Search<'a> {
         let stays = this.end == last;
         let mut found: Vec<(f64, usize, Place, [f64; 2])> = Vec::new();
         let mut nearest = None;
+        // Many partial plans step from the same cell.
+        let mut excesses = HashMap::new();
         for (n, partial) in beam.iter().enumerate() {
             let at = begin.clamp(partial.interval[0], partial.interval[1]);
             let wanted = (mid + KEPT_LAG * (at - begin)).min(self.path.length);
             let late = LATE * (at - begin).powi(2);
             nearest.get_or_insert(wanted);
+            let from = &partial.places[foot];
             for place in self.places_for(foot, stance, wanted) {
+                let excess = *excesses
+                    .entry([from.cell, place.cell])
+                    .or_insert_with(|| self.excess(foot, from, &place));
                 let mut interval = partial.interval;
                 let within_reach = self.within_reach(foot, &place);
                 let mut lacking = narrow(&mut interval, within_reach);
@@ -300,19 +306,21 @@ impl<'a> Search<'a> {
                     + late
                     + place.cost
                     + (place.s - wanted).powi(2)
-                    + BEYOND * (lacking.powi(2) + self.out_of_reach(foot, &place, base).powi(2))
-                    + BEYOND * self.out_of_reach(foot, &place, 2.0 * place.s - base).powi(2)
-                    + self.step_cost(&partial.places[foot], &place, foot, travel);
+                    + BEYOND * (lacking.powi(2) + self.out_of_reach(foot, &place, base))
+                    + BEYOND * self.out_of_reach(foot, &place, 2.0 * place.s - base)
+                    + REGULAR * (place.s - from.s - travel).powi(2)
+                    + BEYOND * excess.powi(2);
                 found.push((cost, n, place, interval));
             }
         }
         if found.is_empty() {
             return Err(self.nothing_to_stand_on(foot, nearest.unwrap_or(begin), switch.time));
         }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut order: Vec<(f64, usize)> = found.iter().enumerate().map(|(k, found)| (found.0, k)).collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut seen = HashSet::new();
         let mut extended = Vec::with_capacity(BEAM);
-        for (cost, n, place, interval) in found {
+        for (cost, n, place, interval) in order.into_iter().map(|(_, k)| found[k]) {
             let mut places = beam[n].places.clone();
             places[foot] = place;
             // Of plans whose feet are at the same places, the cheapest.
@@ -378,7 +386,7 @@ impl<'a> Search<'a> {
         self.tracks[foot].iter().flatten().filter(|place| (place.s - s).abs() <= window).copied().collect()
     }
 
-    /// How far a foothold is out of the reach box sideways and in height, with the base at s, m.
+    /// How far a foothold is out of the reach box sideways and in height, with the base at s, squared, m².
     fn out_of_reach(&self, foot: usize, place: &Place, s: f64) -> f64 {
         let reach = &self.model.reach[foot];
         let pose = &self.way[self.number(s)];
@@ -386,18 +394,14 @@ impl<'a> Search<'a> {
         let beyond = |d: usize| {
             ((local[d] - reach.center[d]).abs() - (1.0 - REACH_MARGIN) * reach.half_size[d]).max(0.0)
         };
-        beyond(1).hypot(beyond(2))
+        beyond(1).powi(2) + beyond(2).powi(2)
     }
 
     /// The pose of the way that is nearest to s.
     fn number(&self, s: f64) -> usize {
-        let n = ((s - self.first) / self.apart).round().max(0.0) as usize;
+        // The cast makes zero of what is negative. `round` would be a call.
+        let n = ((s - self.first) / self.apart + 0.5) as usize;
         n.min(self.way.len() - 1)
-    }
-
-    fn step_cost(&self, from: &Place, to: &Place, foot: usize, travel: f64) -> f64 {
-        let (irregular, excess) = (to.s - from.s - travel, self.excess(foot, from, to));
-        REGULAR * irregular * irregular + BEYOND * excess * excess
     }
 
     /// What a step is longer and higher than the leg can take, m.

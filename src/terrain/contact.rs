@@ -4,7 +4,7 @@
 //! foot rises so far above it that the foot would touch it on its way down. Nor does a foot stand where a scan has no data, unless the
 //! hole is narrower than the foot.
 
-use super::morphology::{Offset, closed, disc, for_each_neighborhood, opened, widened};
+use super::morphology::{Bordered, Offset, closed, disc, opened, widened};
 use super::patch::Patch;
 use crate::heightfield::Grid;
 
@@ -61,20 +61,24 @@ impl ContactGround {
     pub fn new(grid: &Grid, heights: &[f64], unknown: Option<&[bool]>, needs: FootNeeds) -> Self {
         let planes = planes(grid, heights, needs.even);
         let mut steppable: Vec<bool> = planes.iter().map(|p| p[1].hypot(p[2]) <= needs.slope).collect();
-        let mut rule_out = |around: &[Offset], fits: &dyn Fn(f64) -> bool| {
-            for_each_neighborhood(grid, around, |cell, mut neighbors| {
-                let [h, x, y] = planes[cell];
-                steppable[cell] = steppable[cell]
-                    && neighbors.all(|(n, i)| {
-                        let (u, v, _) = around[n];
-                        let plane = h + x * u as f64 * grid.spacing[0] + y * v as f64 * grid.spacing[1];
-                        fits(heights[i] - plane)
-                    });
-            });
-        };
         let under_foot = under_foot(grid, needs.even);
-        rule_out(&under_foot, &|above| above.abs() <= needs.roughness);
-        rule_out(&disc(grid, needs.beside), &|above| above <= RISE_BESIDE * needs.roughness);
+        let mut rule_out = |around: &[Offset], fits: fn(&FootNeeds, f64) -> bool| {
+            let bordered = Bordered::new(grid, heights, around);
+            let rows = steppable.chunks_exact_mut(grid.columns).zip(planes.chunks_exact(grid.columns));
+            for (row, (steppable, planes)) in rows.enumerate() {
+                for offset in around {
+                    let (u, v) = (offset.0 as f64, offset.1 as f64);
+                    let neighbors = planes.iter().zip(bordered.neighbors(row, offset));
+                    for (steppable, (plane, height)) in steppable.iter_mut().zip(neighbors) {
+                        let [h, x, y] = *plane;
+                        let plane = h + x * u * grid.spacing[0] + y * v * grid.spacing[1];
+                        *steppable &= fits(&needs, height - plane);
+                    }
+                }
+            }
+        };
+        rule_out(&under_foot, |needs, above| above.abs() <= needs.roughness);
+        rule_out(&disc(grid, needs.beside), |needs, above| above <= RISE_BESIDE * needs.roughness);
         for ((steppable, height), filled) in
             steppable.iter_mut().zip(heights).zip(closed(grid, heights, needs.gap))
         {
@@ -276,17 +280,19 @@ fn planes(grid: &Grid, heights: &[f64], radius: f64) -> Vec<[f64; 3]> {
         let (x, y) = place(o);
         (xx + x * x, yy + y * y)
     });
+    let bordered = Bordered::new(grid, heights, &around);
     let mut planes = vec![[0.0; 3]; heights.len()];
-    for_each_neighborhood(grid, &around, |cell, neighbors| {
-        let (mut sum, mut by_x, mut by_y) = (0.0, 0.0, 0.0);
-        for (n, i) in neighbors {
-            let (x, y) = place(around[n]);
-            sum += heights[i];
-            by_x += x * heights[i];
-            by_y += y * heights[i];
+    for (row, planes) in planes.chunks_exact_mut(grid.columns).enumerate() {
+        for &offset in &around {
+            let (x, y) = place(offset);
+            for (sums, height) in planes.iter_mut().zip(bordered.neighbors(row, &offset)) {
+                *sums = [sums[0] + height, sums[1] + x * height, sums[2] + y * height];
+            }
         }
-        planes[cell] = [sum / around.len() as f64, by_x / xx, by_y / yy];
-    });
+        for sums in planes {
+            *sums = [sums[0] / around.len() as f64, sums[1] / xx, sums[2] / yy];
+        }
+    }
     planes
 }
 

@@ -1,5 +1,7 @@
 //! Fills the holes of measured ground: each with a membrane stretched over its rim.
 
+use arrayvec::ArrayVec;
+
 use super::raster::{bilinear, range};
 use crate::error::{Error, Result};
 
@@ -41,22 +43,21 @@ fn fill_level(columns: usize, heights: &mut [f64], tolerance: f64) {
     for &i in &holes {
         heights[i] = half_at(half_columns, &half, i % columns, i / columns);
     }
+    let inner = |i: usize| {
+        let (column, row) = (i % columns, i / columns);
+        column > 0 && column + 1 < columns && row > 0 && row + 1 < rows
+    };
+    let holes: Vec<(usize, bool)> = holes.into_iter().map(|i| (i, inner(i))).collect();
     for _ in 0..FILL_SWEEPS.min(FILL_WORK.div_ceil(holes.len())) {
         let mut largest = 0.0_f64;
-        for &i in &holes {
-            let (column, row) = (i % columns, i / columns);
-            let (mut sum, mut count) = (0.0, 0.0);
-            let mut add = |there: bool, j: usize| {
-                if there {
-                    sum += heights[j];
-                    count += 1.0;
+        for &(i, inner) in &holes {
+            let mean = match inner {
+                true => {
+                    0.25 * (heights[i - 1] + heights[i + 1] + heights[i - columns] + heights[i + columns])
                 }
+                false => mean_around(columns, heights, i),
             };
-            add(column > 0, i.wrapping_sub(1));
-            add(column + 1 < columns, i + 1);
-            add(row > 0, i.wrapping_sub(columns));
-            add(row + 1 < rows, i + columns);
-            let change = omega * (sum / count - heights[i]);
+            let change = omega * (mean - heights[i]);
             heights[i] += change;
             largest = largest.max(change.abs());
         }
@@ -64,6 +65,22 @@ fn fill_level(columns: usize, heights: &mut [f64], tolerance: f64) {
             break;
         }
     }
+}
+
+/// The mean of a cell's neighbors, as far as it has them.
+fn mean_around(columns: usize, heights: &[f64], i: usize) -> f64 {
+    let (column, row) = (i % columns, i / columns);
+    let mut neighbors = ArrayVec::<f64, 4>::new();
+    let mut add = |there: bool, j: usize| {
+        if there {
+            neighbors.push(heights[j]);
+        }
+    };
+    add(column > 0, i.wrapping_sub(1));
+    add(column + 1 < columns, i + 1);
+    add(row > 0, i.wrapping_sub(columns));
+    add(i + columns < heights.len(), i + columns);
+    neighbors.iter().sum::<f64>() / neighbors.len() as f64
 }
 
 /// The optimal factor of successive over-relaxation for the widest hole, 2/(1 + sin(π/width)).

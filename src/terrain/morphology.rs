@@ -24,31 +24,58 @@ pub fn disc(grid: &Grid, radius: f64) -> Vec<Offset> {
     offsets
 }
 
-/// The cells at some offsets from one cell, clamped to the raster: (number of the offset, index).
-pub struct Neighbors<'a> {
-    grid: &'a Grid,
-    offsets: std::iter::Enumerate<std::slice::Iter<'a, Offset>>,
-    column: isize,
-    row: isize,
+/// A raster with its outermost cells repeated outward as far as some offsets reach, so that every cell has a neighbor at each of them.
+/// What is done with neighbors goes through the raster row by row and offset by offset, which the compiler turns into vector instructions.
+pub struct Bordered<T> {
+    values: Vec<T>,
+    /// Cells that are added at each side along x and y.
+    reach: [usize; 2],
+    columns: usize,
 }
 
-impl Iterator for Neighbors<'_> {
-    type Item = (usize, usize);
+impl<T: Copy> Bordered<T> {
+    /// Repeats the border of a raster by rows.
+    pub fn new(grid: &Grid, values: &[T], offsets: &[Offset]) -> Self {
+        let reach = offsets
+            .iter()
+            .fold([0, 0], |[x, y], &(u, v, _)| [x.max(u.unsigned_abs()), y.max(v.unsigned_abs())]);
+        let mut bordered = Vec::with_capacity((grid.columns + 2 * reach[0]) * (grid.rows + 2 * reach[1]));
+        for row in 0..grid.rows + 2 * reach[1] {
+            let row = row.saturating_sub(reach[1]).min(grid.rows - 1);
+            let row = &values[row * grid.columns..(row + 1) * grid.columns];
+            bordered.extend(std::iter::repeat_n(row[0], reach[0]));
+            bordered.extend_from_slice(row);
+            bordered.extend(std::iter::repeat_n(row[grid.columns - 1], reach[0]));
+        }
+        Self { values: bordered, reach, columns: grid.columns }
+    }
 
-    fn next(&mut self) -> Option<(usize, usize)> {
-        let (n, &(u, v, _)) = self.offsets.next()?;
-        let column = (self.column + u).clamp(0, self.grid.columns as isize - 1);
-        let row = (self.row + v).clamp(0, self.grid.rows as isize - 1);
-        Some((n, row as usize * self.grid.columns + column as usize))
+    /// The neighbors of a row's cells at an offset.
+    pub fn neighbors(&self, row: usize, &(u, v, _): &Offset) -> &[T] {
+        let row = (row + self.reach[1]).wrapping_add_signed(v);
+        let start = row * (self.columns + 2 * self.reach[0]) + self.reach[0].wrapping_add_signed(u);
+        &self.values[start..start + self.columns]
     }
 }
 
-/// Visits every cell with its neighbors at some offsets.
-pub fn for_each_neighborhood(grid: &Grid, offsets: &[Offset], mut visit: impl FnMut(usize, Neighbors)) {
-    for cell in 0..grid.len() {
-        let (column, row) = ((cell % grid.columns) as isize, (cell / grid.columns) as isize);
-        visit(cell, Neighbors { grid, offsets: offsets.iter().enumerate(), column, row });
+/// Combines each cell's initial value with its neighbors, in the order of the offsets, which are numbered.
+fn combined<T: Copy, R: Copy>(
+    grid: &Grid,
+    values: &[T],
+    offsets: &[Offset],
+    initial: R,
+    combine: impl Fn(R, usize, T) -> R,
+) -> Vec<R> {
+    let bordered = Bordered::new(grid, values, offsets);
+    let mut results = vec![initial; grid.len()];
+    for (row, results) in results.chunks_exact_mut(grid.columns).enumerate() {
+        for (n, offset) in offsets.iter().enumerate() {
+            for (result, value) in results.iter_mut().zip(bordered.neighbors(row, offset)) {
+                *result = combine(*result, n, *value);
+            }
+        }
     }
+    results
 }
 
 /// The lowest height, m, that the bottom of a ball of this radius can have over each cell without entering the ground:
@@ -56,46 +83,39 @@ pub fn for_each_neighborhood(grid: &Grid, offsets: &[Offset], mut visit: impl Fn
 pub fn rolled_over(grid: &Grid, heights: &[f64], radius: f64) -> Vec<f64> {
     let offsets = disc(grid, radius);
     let cap: Vec<f64> = offsets.iter().map(|o| (radius * radius - o.2).max(0.0).sqrt() - radius).collect();
-    let mut rolled = vec![0.0; heights.len()];
-    for_each_neighborhood(grid, &offsets, |cell, around| {
-        rolled[cell] = around.map(|(n, i)| heights[i] + cap[n]).fold(f64::NEG_INFINITY, f64::max);
-    });
-    rolled
+    combined(grid, heights, &offsets, f64::NEG_INFINITY, |highest, n, h| highest.max(h + cap[n]))
 }
 
 /// The heights with all that is narrower than `width` m, along x or y, and lower than its surroundings filled: the greatest height
 /// within half of the width, then the least of these (a morphological closing by a square).
 pub fn closed(grid: &Grid, heights: &[f64], width: f64) -> Vec<f64> {
-    let extreme = |heights: Vec<f64>, pick: fn(f64, f64) -> f64| {
-        [[1, 0], [0, 1]].into_iter().enumerate().fold(heights, |heights, (axis, along)| {
-            let reach = (0.5 * width / grid.spacing[axis]) as isize;
-            let offsets: Vec<Offset> = (-reach..=reach).map(|k| (k * along[0], k * along[1], 0.0)).collect();
-            let mut result = heights.clone();
-            for_each_neighborhood(grid, &offsets, |cell, around| {
-                result[cell] = around.map(|(_, i)| heights[i]).fold(heights[cell], pick);
-            });
-            result
-        })
-    };
-    extreme(extreme(heights.to_vec(), f64::max), f64::min)
+    let reach = grid.spacing.map(|spacing| (0.5 * width / spacing) as isize);
+    let lines: [Vec<Offset>; 2] = [
+        (-reach[0]..=reach[0]).map(|k| (k, 0, 0.0)).collect(),
+        (-reach[1]..=reach[1]).map(|k| (0, k, 0.0)).collect(),
+    ];
+    let highest = lines.iter().fold(heights.to_vec(), |heights, line| {
+        combined(grid, &heights, line, f64::NEG_INFINITY, |highest, _, h| highest.max(h))
+    });
+    lines.iter().fold(highest, |heights, line| {
+        combined(grid, &heights, line, f64::INFINITY, |lowest, _, h| lowest.min(h))
+    })
 }
 
 /// The cells of a set that a disc within the set can cover (a morphological opening): without what is narrower than the disc.
 pub fn opened(grid: &Grid, set: &[bool], radius: f64) -> Vec<bool> {
-    let around = disc(grid, radius);
-    let mut middles = vec![false; set.len()];
-    for_each_neighborhood(grid, &around, |cell, mut neighbors| {
-        middles[cell] = neighbors.all(|(_, i)| set[i])
-    });
+    let middles = combined(grid, set, &disc(grid, radius), true, |all, _, inside| all & inside);
     widened(grid, &middles, radius)
 }
 
 /// The cells within a distance of a set.
 pub fn widened(grid: &Grid, set: &[bool], radius: f64) -> Vec<bool> {
-    let around = disc(grid, radius);
-    let mut wide = vec![false; set.len()];
-    for_each_neighborhood(grid, &around, |cell, mut neighbors| wide[cell] = neighbors.any(|(_, i)| set[i]));
-    wide
+    combined(grid, set, &disc(grid, radius), false, |any, _, inside| any | inside)
+}
+
+/// How many cells of a set are at the offsets from each cell.
+pub fn counted(grid: &Grid, set: &[bool], offsets: &[Offset]) -> Vec<u32> {
+    combined(grid, set, offsets, 0, |count, _, inside| count + u32::from(inside))
 }
 
 /// The average under a Gaussian of this standard deviation, m; beyond the border the outermost cells are repeated.
@@ -114,11 +134,7 @@ pub fn averaged(grid: &Grid, heights: &[f64], deviation: f64) -> Vec<f64> {
 fn convolved(grid: &Grid, heights: &[f64], kernel: &[f64], axis: [isize; 2]) -> Vec<f64> {
     let reach = kernel.len() as isize / 2;
     let offsets: Vec<_> = (-reach..=reach).map(|k| (k * axis[0], k * axis[1], 0.0)).collect();
-    let mut result = vec![0.0; heights.len()];
-    for_each_neighborhood(grid, &offsets, |cell, around| {
-        result[cell] = around.map(|(n, i)| kernel[n] * heights[i]).sum();
-    });
-    result
+    combined(grid, heights, &offsets, 0.0, |sum, n, h| sum + kernel[n] * h)
 }
 
 #[cfg(test)]

@@ -23,46 +23,52 @@ pub fn smooth(columns: usize, heights: &[f64], filled: &[bool], width: f64) -> V
     let kernel: Vec<f64> =
         (0..=2 * reach).map(|k| (-0.5 * ((k as f64 - reach as f64) / width).powi(2)).exp()).collect();
     let mut result = Vec::with_capacity(heights.len());
+    let mut sums = vec![[0.0; 9]; columns];
     for band in (0..rows).step_by(BAND) {
         let first = band.saturating_sub(reach);
         let last = (band + BAND + reach).min(rows);
-        let moments: Vec<[f64; 5]> = (first * columns..last * columns)
-            .map(|i| row_moments(columns, heights, filled, &kernel, i))
+        let moments: Vec<[f64; 5]> = (first..last)
+            .flat_map(|row| {
+                let row = row * columns..(row + 1) * columns;
+                row_moments(&heights[row.clone()], &filled[row], &kernel)
+            })
             .collect();
         for row in band..(band + BAND).min(rows) {
-            for column in 0..columns {
-                let mut s = [0.0; 9];
-                for r in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
-                    let dy = r as f64 - row as f64;
-                    let k = kernel[r + reach - row];
-                    let [m, mx, mxx, z, zx] = moments[(r - first) * columns + column];
+            sums.fill([0.0; 9]);
+            for r in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
+                let dy = r as f64 - row as f64;
+                let k = kernel[r + reach - row];
+                let moments = &moments[(r - first) * columns..(r - first + 1) * columns];
+                for (sums, &[m, mx, mxx, z, zx]) in sums.iter_mut().zip(moments) {
                     let terms = [m, mx, m * dy, mxx, mx * dy, m * dy * dy, z, zx, z * dy];
-                    for (sum, term) in s.iter_mut().zip(terms) {
+                    for (sum, term) in sums.iter_mut().zip(terms) {
                         *sum += k * term;
                     }
                 }
-                result.push(plane_value(s));
             }
+            result.extend(sums.iter().map(|sums| plane_value(*sums)));
         }
     }
     result
 }
 
-/// Σ w, Σ w dx, Σ w dx², Σ w z, Σ w z dx along the row through cell i, with dx in cells from it.
-fn row_moments(columns: usize, heights: &[f64], filled: &[bool], kernel: &[f64], i: usize) -> [f64; 5] {
-    let reach = kernel.len() / 2;
-    let column = i % columns;
-    let start = i - column;
-    let mut sums = [0.0; 5];
-    for c in column.saturating_sub(reach)..(column + reach + 1).min(columns) {
-        let dx = c as f64 - column as f64;
-        let w = kernel[c + reach - column] * if filled[start + c] { FILLED_WEIGHT } else { 1.0 };
-        let z = heights[start + c];
-        for (sum, term) in sums.iter_mut().zip([1.0, dx, dx * dx, z, z * dx]) {
-            *sum += w * term;
+/// Σ w, Σ w dx, Σ w dx², Σ w z, Σ w z dx along a row of cells through each of them, with dx in cells from it.
+fn row_moments(heights: &[f64], filled: &[bool], kernel: &[f64]) -> Vec<[f64; 5]> {
+    let (reach, columns) = (kernel.len() / 2, heights.len());
+    let mut moments = vec![[0.0; 5]; columns];
+    // As far as there are two cells of the row at such a distance.
+    for n in reach.saturating_sub(columns - 1)..kernel.len().min(reach + columns) {
+        let dx = n as f64 - reach as f64;
+        let middles = reach.saturating_sub(n)..columns.min(columns + reach - n);
+        let start = n.saturating_sub(reach);
+        for ((sums, z), filled) in moments[middles].iter_mut().zip(&heights[start..]).zip(&filled[start..]) {
+            let w = kernel[n] * if *filled { FILLED_WEIGHT } else { 1.0 };
+            for (sum, term) in sums.iter_mut().zip([1.0, dx, dx * dx, *z, z * dx]) {
+                *sum += w * term;
+            }
         }
     }
-    sums
+    moments
 }
 
 /// a of the weighted least-squares plane a + b dx + c dy, from Σw·(1, x, y, x², xy, y², z, zx, zy): eliminating b and c

@@ -14,7 +14,7 @@ use super::detour::{Bends, bends};
 use super::fill::fill_holes;
 use super::ground::Ground;
 use super::keep_out::KeepOut;
-use super::morphology::{averaged, disc, for_each_neighborhood, rolled_over};
+use super::morphology::{averaged, counted, disc, rolled_over};
 use super::smooth::smooth;
 use crate::error::Result;
 use crate::heightfield::{Grid, Heightfield};
@@ -176,12 +176,11 @@ fn posture(contact: &ContactGround, heights: &[f64], deviation: f64) -> Result<V
     let grid: &Grid = contact.grid();
     let around = disc(grid, deviation * 2.0 / 3.0);
     let mut filled = heights.to_vec();
-    let mut holes = vec![false; heights.len()];
-    for_each_neighborhood(grid, &around, |cell, neighbors| {
-        let steppable = neighbors.filter(|&(_, i)| contact.steppable()[i]).count();
-        holes[cell] =
-            !contact.steppable()[cell] || (steppable as f64) < LEAST_STEPPABLE * around.len() as f64;
-    });
+    let steppable = contact.steppable();
+    let enough = LEAST_STEPPABLE * around.len() as f64;
+    let holes: Vec<bool> = (counted(grid, steppable, &around).into_iter().zip(steppable))
+        .map(|(count, steppable)| !steppable || f64::from(count) < enough)
+        .collect();
     for (height, hole) in filled.iter_mut().zip(&holes) {
         if *hole {
             *height = f64::NAN;
