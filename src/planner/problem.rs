@@ -48,8 +48,9 @@ use crate::nlp::{Constraint, Cost, LegTerms, Model, State};
 const COST_SCALE: f64 = 1e3;
 /// Weight of the swings' acceleration, relative to that of the base's.
 const SWING_WEIGHT: f64 = 1e-3;
-/// The same where swings are higher and longer, as over ground with edges: joints and controller must follow them.
-const HIGH_SWING_WEIGHT: f64 = 3e-2;
+/// The same where swings are higher and longer, as over ground with edges. Joints and controller must follow them, and massless legs
+/// leave out the forces that they take. More than this keeps swings so close to the edges that worlds that differ make feet touch them.
+const HIGH_SWING_WEIGHT: f64 = 1.5;
 /// Elsewhere, swings are high from this clearance on, m, for a robot of ANYmal's size.
 const HIGH_SWING: f64 = 0.1;
 /// Weight of the posture, relative to that of the base's acceleration, s⁻⁴.
