@@ -11,6 +11,8 @@
 //!
 //! with hᵢ half the range of joint i. A leg of three joints has only one posture near the one before.
 
+use arrayvec::ArrayVec;
+
 use super::vector::{
     Turn, add, apply, cross, dot, norm, product, rotate_back, rotation, scale, solve, sub, transposed,
     turn_between,
@@ -24,6 +26,8 @@ const MOST_JOINTS: usize = 7;
 const FOUND: f64 = 1e-9;
 /// Steps of Newton's method at most; one sample is near the one before it.
 const STEPS: usize = 30;
+/// Of one angle, rad.
+const LARGEST_STEP: f64 = 0.3;
 /// rad: a leg of more than three joints is at its least distance from the stance when a step is smaller.
 const AT_LEAST: f64 = 1e-7;
 /// Least and greatest hᵢ, rad.
@@ -65,8 +69,8 @@ pub(super) type Axis = ([f64; 3], [f64; 3]);
 
 /// A leg in a posture: base frame, origin at the center of mass of the nominal stance.
 struct PlacedLeg {
-    links: Vec<Placed>,
-    axes: Vec<Axis>,
+    links: ArrayVec<Placed, MOST_JOINTS>,
+    axes: ArrayVec<Axis, MOST_JOINTS>,
     /// The center of the foot.
     foot: [f64; 3],
 }
@@ -127,7 +131,7 @@ impl Leg {
     fn place(&self, q: &[f64]) -> PlacedLeg {
         let mut turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut at = [0.0; 3];
-        let (mut links, mut axes) = (Vec::new(), Vec::new());
+        let (mut links, mut axes) = (ArrayVec::new(), ArrayVec::new());
         for (joint, angle) in self.joints.iter().zip(q) {
             at = add(at, apply(&turn, joint.position));
             axes.push((at, apply(&turn, joint.axis)));
@@ -144,23 +148,34 @@ impl Leg {
         self.joints.iter().map(|joint| joint.stance).collect()
     }
 
-    /// Newton's method from the angles q: whether they reach the center of the foot at `target`. The unknowns are q and the multipliers λ
+    /// Newton's method from the angles q: the leg with the center of its foot at `target`, if that is reached. The unknowns are q and the multipliers λ
     /// of
     ///
     /// ```text
     ///   W (q − q̄) + (∂F/∂q)ᵀ λ = 0,   F(q) = c
     /// ```
-    fn solve(&self, target: [f64; 3], q: &mut [f64]) -> bool {
+    fn solve(&self, target: [f64; 3], q: &mut [f64]) -> Option<PlacedLeg> {
         let n = q.len();
         let mut lambda = [0.0; 3];
         let mut last = if n > 3 { f64::INFINITY } else { 0.0 };
         for _ in 0..STEPS {
-            let PlacedLeg { axes, foot, .. } = self.place(q);
+            let placed = self.place(q);
+            let (axes, foot) = (&placed.axes, placed.foot);
             let miss = sub(target, foot);
             if norm(miss) < FOUND && last < AT_LEAST {
-                return true;
+                return Some(placed);
             }
-            let columns: Vec<[f64; 3]> = axes.iter().map(|(at, axis)| cross(*axis, sub(foot, *at))).collect();
+            let columns: ArrayVec<[f64; 3], MOST_JOINTS> =
+                axes.iter().map(|(at, axis)| cross(*axis, sub(foot, *at))).collect();
+            if let [a, b, c] = columns[..] {
+                // As many equations as joints: λ does not matter.
+                let determinant = dot(a, cross(b, c));
+                let step = [cross(b, c), cross(c, a), cross(a, b)].map(|m| dot(m, miss) / determinant);
+                let largest = step.iter().fold(0.0, |most: f64, step| most.max(step.abs()));
+                let most = (largest / LARGEST_STEP).max(1.0);
+                q.iter_mut().zip(step).for_each(|(angle, step)| *angle += step / most);
+                continue;
+            }
             let mut rows = vec![vec![0.0; n + 3]; n + 3];
             let mut right = vec![0.0; n + 3];
             for (i, joint) in self.joints.iter().enumerate() {
@@ -177,10 +192,10 @@ impl Leg {
             right[n..].copy_from_slice(&miss);
             solve(&mut rows, &mut right);
             last = right[..n].iter().fold(0.0, |most: f64, step| most.max(step.abs()));
-            let most = (last / 0.3).max(1.0);
+            let most = (last / LARGEST_STEP).max(1.0);
             q.iter_mut().chain(&mut lambda).zip(right).for_each(|(value, step)| *value += step / most);
         }
-        false
+        None
     }
 }
 
@@ -222,7 +237,16 @@ impl BodyMotion {
         let (mut all_axes, mut all_angles) =
             (Vec::with_capacity(samples), Vec::with_capacity(samples * feet));
         let mut here = [0.0; 3];
+        // How many samples in a row had postures, and the one before the last.
+        let (mut in_a_row, mut last) = (0, (here, angles.clone()));
         for n in 0..samples {
+            let (earlier, posture) = std::mem::replace(&mut last, (here, angles.clone()));
+            if in_a_row >= 2 {
+                // Shift and angles go on changing as they did.
+                here = add(here, sub(here, earlier));
+                let changes = angles.iter_mut().flatten().zip(posture.into_iter().flatten());
+                changes.for_each(|(angle, before)| *angle += *angle - before);
+            }
             let from_center = |e: usize| {
                 let world = sub(centers[n * feet + e], plan.base_position[n]);
                 rotate_back(plan.base_quaternion_wxyz[n], world)
@@ -232,8 +256,9 @@ impl BodyMotion {
             for _ in 0..ROUNDS {
                 (links, axes) = (vec![trunk], Vec::new());
                 for (e, leg) in legs.iter().enumerate() {
-                    found &= leg.solve(add(from_center(e), here), &mut angles[e]);
-                    let placed = leg.place(&angles[e]);
+                    let placed = leg.solve(add(from_center(e), here), &mut angles[e]);
+                    found &= placed.is_some();
+                    let placed = placed.unwrap_or_else(|| leg.place(&angles[e]));
                     links.extend(placed.links);
                     axes.extend(placed.axes);
                 }
@@ -248,6 +273,7 @@ impl BodyMotion {
                 // Out of reach: no law that needs the posture holds.
                 (here, angles) = ([0.0; 3], legs.iter().map(Leg::stance).collect());
             }
+            in_a_row = if found { in_a_row + 1 } else { 0 };
             shift[n] = if found { here } else { [f64::NAN; 3] };
             all_angles.extend(angles.iter().cloned());
             all_axes.push(axes);
@@ -291,10 +317,7 @@ pub(super) fn spin(inertia: &Turn, before: &Turn, after: &Turn, step: f64) -> [f
 fn trunk(robot: &MetaRobot, legs: &[Leg], angles: &mut [Vec<f64>]) -> Option<Placed> {
     let mut links = Vec::new();
     for ((leg, nominal), q) in legs.iter().zip(&robot.nominal).zip(angles) {
-        if !leg.solve(add(*nominal, [0.0, 0.0, leg.radius]), q) {
-            return None;
-        }
-        links.extend(leg.place(q).links);
+        links.extend(leg.solve(add(*nominal, [0.0, 0.0, leg.radius]), q)?.links);
     }
     let mass = robot.mass - links.iter().map(|link| link.mass).sum::<f64>();
     if mass <= 0.0 {

@@ -99,6 +99,20 @@ impl Grid {
         self.origin[1] + self.spacing[1] * row as f64
     }
 
+    /// x of the columns and y of the rows, m.
+    pub fn lines(&self) -> [Vec<f64>; 2] {
+        [(0..self.columns).map(|k| self.x(k)).collect(), (0..self.rows).map(|k| self.y(k)).collect()]
+    }
+
+    /// x halfway between neighboring columns, and y halfway between neighboring rows, m.
+    pub fn lines_between(&self) -> [Vec<f64>; 2] {
+        let [xs, ys] = self.lines();
+        let between = |lines: Vec<f64>, spacing: f64| -> Vec<f64> {
+            lines[..lines.len() - 1].iter().map(|at| at + 0.5 * spacing).collect()
+        };
+        [between(xs, self.spacing[0]), between(ys, self.spacing[1])]
+    }
+
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.columns * self.rows
@@ -224,6 +238,25 @@ impl Heightfield {
         let (wx, wy) = (self.axes[0].weights::<2>(x), self.axes[1].weights::<2>(y));
         let [c, c_y] = self.contract(&wx, &wy);
         (dot(&wx.weights[0], &c), [dot(&wx.weights[1], &c), dot(&wx.weights[0], &c_y)])
+    }
+
+    /// Visits all crossings of lines x = const and y = const, row by row, with x, y, h and (∂h/∂x, ∂h/∂y), which are those of
+    /// [`Heightfield::height_and_gradient`]; what a line's crossings have in common is computed once.
+    pub fn for_each_crossing(&self, xs: &[f64], ys: &[f64], mut visit: impl FnMut([f64; 2], f64, [f64; 2])) {
+        let columns: Vec<Weights<2>> = xs.iter().map(|&x| self.axes[0].weights(x)).collect();
+        let mut along = vec![[0.0; 2]; self.axes[0].count + 2];
+        for &y in ys {
+            let wy = self.axes[1].weights::<2>(y);
+            for (sums, line) in along.iter_mut().zip(self.coefficients.chunks_exact(self.axes[1].count + 2)) {
+                let line = &line[wy.first..wy.first + 4];
+                *sums = wy.weights.map(|w| w[0] * line[0] + w[1] * line[1] + w[2] * line[2] + w[3] * line[3]);
+            }
+            for (&x, wx) in xs.iter().zip(&columns) {
+                let near = &along[wx.first..wx.first + 4];
+                let [c, c_y] = [0, 1].map(|order| std::array::from_fn(|i| near[i][order]));
+                visit([x, y], dot(&wx.weights[0], &c), [dot(&wx.weights[1], &c), dot(&wx.weights[0], &c_y)]);
+            }
+        }
     }
 
     /// h and its derivatives up to the third order.

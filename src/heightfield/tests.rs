@@ -198,6 +198,23 @@ fn grids_hit_the_extent_exactly() {
 }
 
 #[test]
+fn crossings_of_lines_have_the_values_of_their_places() {
+    let field = rough();
+    let [mut xs, ys] = field.grid().lines_between();
+    assert_eq!((xs.len(), ys.len()), (8, 6));
+    assert!((xs[0] + 0.645).abs() < 1e-12 && (ys[5] - 1.135).abs() < 1e-12);
+    // Also beyond the ends.
+    xs.extend([-1.0, 0.5]);
+    let mut visited = Vec::new();
+    field.for_each_crossing(&xs, &ys, |place, h, gradient| visited.push((place, h, gradient)));
+    let places: Vec<[f64; 2]> = ys.iter().flat_map(|&y| xs.iter().map(move |&x| [x, y])).collect();
+    assert_eq!(visited.len(), places.len());
+    for ((place, h, gradient), [x, y]) in visited.into_iter().zip(places) {
+        assert_eq!((place, (h, gradient)), ([x, y], field.height_and_gradient(x, y)));
+    }
+}
+
+#[test]
 fn bad_grids_are_refused() {
     let message = |r: Result<Heightfield>| r.unwrap_err().to_string();
     let flat = |extent, spacing| message(Heightfield::from_function(extent, spacing, |_, _| Ok(0.0)));

@@ -125,12 +125,12 @@ fn steepest(scenario: &Scenario) -> f64 {
 
 /// Whether ground is nowhere steeper than a slope, at its samples.
 fn is_below(ground: &Heightfield, slope: f64) -> bool {
-    let grid = ground.grid();
-    slope.is_infinite()
-        || (0..grid.len()).all(|n| {
-            let [x, y] = ground.gradient(grid.x(n % grid.columns), grid.y(n / grid.columns));
-            x.hypot(y) <= slope
-        })
+    let [xs, ys] = ground.grid().lines();
+    let mut steepest = 0.0_f64;
+    if slope.is_finite() {
+        ground.for_each_crossing(&xs, &ys, |_, _, [x, y]| steepest = steepest.max(x * x + y * y));
+    }
+    steepest.sqrt() <= slope
 }
 
 impl Search {

@@ -15,12 +15,14 @@ const NOTABLE_ERROR: f64 = 0.002;
 pub fn ground(kind: &'static str, domain: &Domain, h: impl Fn(f64, f64) -> Result<f64>) -> Result<Ground> {
     let field = field(domain, &h)?;
     let grid = field.grid();
-    let mut error = FitError::default();
-    for row in 0..grid.rows - 1 {
-        for column in 0..grid.columns - 1 {
-            let (x, y) = (grid.x(column) + 0.5 * grid.spacing[0], grid.y(row) + 0.5 * grid.spacing[1]);
-            error.add(x, y, field.height(x, y) - h(x, y)?);
-        }
+    let [xs, ys] = grid.lines_between();
+    let (mut error, mut failed) = (FitError::default(), None);
+    field.for_each_crossing(&xs, &ys, |[x, y], height, _| match h(x, y) {
+        Ok(expected) => error.add(x, y, height - expected),
+        Err(e) => failed = failed.take().or(Some(e)),
+    });
+    if let Some(failed) = failed {
+        return Err(failed);
     }
     let mut report = GroundReport::of(kind, &field, &error);
     if error.max > NOTABLE_ERROR {

@@ -78,22 +78,13 @@ impl GroundReport {
         let grid = field.grid();
         let (low, high) = range(field.samples());
         let (mut largest_square, mut steepest_at) = (0.0, [grid.x(0), grid.y(0)]);
-        let mut look = |x: f64, y: f64| {
-            let [hx, hy] = field.gradient(x, y);
-            let square = hx * hx + hy * hy;
-            if square > largest_square {
-                largest_square = square;
-                steepest_at = [x, y];
-            }
-        };
-        for row in 0..grid.rows {
-            for column in 0..grid.columns {
-                let (x, y) = (grid.x(column), grid.y(row));
-                look(x, y);
-                if row + 1 < grid.rows && column + 1 < grid.columns {
-                    look(x + 0.5 * grid.spacing[0], y + 0.5 * grid.spacing[1]);
+        for [xs, ys] in [grid.lines(), grid.lines_between()] {
+            field.for_each_crossing(&xs, &ys, |place, _, [hx, hy]| {
+                let square = hx * hx + hy * hy;
+                if square > largest_square {
+                    (largest_square, steepest_at) = (square, place);
                 }
-            }
+            });
         }
         Self {
             kind,
