@@ -154,6 +154,52 @@ fn short_treads_get_more_steps() {
     assert!(stairs > flat, "{stairs} steps on the stairs and {flat} on the flat");
 }
 
+/// Nothing in the choice of steps and footholds is of ANYmal's size.
+#[test]
+fn a_robot_of_half_the_size_takes_steps_of_half_the_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let steps = |ground: &str, size: f64| {
+        let lengths = |values: [f64; 3]| values.map(|value| size * value);
+        let feet: Vec<String> = [("LF", 1.0, 1.0), ("RF", 1.0, -1.0), ("LH", -1.0, 1.0), ("RH", -1.0, -1.0)]
+            .map(|(name, ahead, left)| {
+                let nominal = lengths([0.34 * ahead, 0.19 * left, -0.43]);
+                let half_size = lengths([0.15, 0.1, 0.1]);
+                format!("[[feet]]\nname = \"{name}\"\nnominal = {nominal:?}\nreach = {{ center = {nominal:?}, half_size = {half_size:?} }}\n")
+            })
+            .into();
+        let robot = format!(
+            "name = \"r\"\nsource = \"a test\"\nmass = 30.0\ninertia = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]\ntorso = {{ center = [0.0, 0.0, 0.0], half_size = {:?} }}\n{}",
+            lengths([0.32, 0.14, 0.1]),
+            feet.concat()
+        );
+        std::fs::write(folder.path().join("r.toml"), robot).unwrap();
+        let ground = ground.replace('X', &format!("(x/{size})")).replace('Y', &format!("(y/{size})"));
+        let text = format!(
+            "formulation = \"direct\"\nhorizon = 10.0\n[robot]\nfile = \"r.toml\"\n[terrain]\nkind = \"formula\"\nexpression = \"{size} * ({ground})\"\n\
+             spacing = {:?}\nextent = {:?}\n[contact]\nfootholds = \"patches\"\n[start]\nposition = {:?}\n[goal]\nposition = {:?}\n",
+            0.02 * size,
+            [-1.4, 4.4, -1.0, 1.0].map(|value| size * value),
+            [-0.4 * size, 0.0],
+            [3.0 * size, 0.0],
+        );
+        let loaded = load_text("s.toml", &text, folder.path(), &[]).expect("a scenario");
+        let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).expect("stairs");
+        prepared.steps
+    };
+    // Treads of 32 cm, and blocks with few places to choose from.
+    let stairs = "0.15*max(0, min(5, 1 + floor((X - 0.6)/0.32)))";
+    let blocks = "0.03*sign(sin(17*X + 0.5)*sin(15*Y + 2*X))";
+    for ground in [stairs, blocks] {
+        let [whole, half] = [1.0, 0.5].map(|size| steps(ground, size));
+        assert!(whole.patches[0].len() > 6 && whole.gait == half.gait, "{ground}");
+        for (whole, half) in whole.patches.iter().flatten().zip(half.patches.iter().flatten()) {
+            for (whole, half) in whole.corners().iter().flatten().zip(half.corners().iter().flatten()) {
+                assert!((0.5 * whole - half).abs() < 1e-9, "{ground}: {whole} and {half}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_robot_with_a_short_reach_finds_footholds_on_stairs() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/stairs.toml");

@@ -67,7 +67,7 @@ impl FootMotion {
     }
 }
 
-/// A path shorter than this, m, is not worth another timing.
+/// A path shorter than this, m, for a robot of ANYmal's size, is not worth another timing.
 const SHORTEST: f64 = 0.2;
 /// The reach box is narrowed by this fraction: the optimized base is not quite where it is guessed.
 pub const REACH_MARGIN: f64 = 0.1;
@@ -138,7 +138,7 @@ impl<'a> BasePath<'a> {
     /// The same way in another time, so that the feet reach their footholds: `footholds[foot][stance]`, x and y.
     pub fn retimed(&self, footholds: &[Vec<[f64; 2]>]) -> Self {
         let layout = &self.model.layout;
-        let timing = (self.length > SHORTEST).then(|| {
+        let timing = (self.length > self.model.size * SHORTEST).then(|| {
             let nominal: Vec<f64> =
                 (0..=layout.intervals).map(|k| self.steady(k as f64 * layout.time_step)).collect();
             let s = retimed(&nominal, &self.corridors(footholds), &self.pace.pins, layout.time_step);

@@ -35,7 +35,7 @@ const BEAM: usize = 300;
 const BEYOND: f64 = 20.0;
 /// Weight of irregular steps.
 const REGULAR: f64 = 0.5;
-/// Cost of each direction without room, m².
+/// Cost of each direction without room, m², for a robot of ANYmal's size.
 const NO_ROOM: f64 = 2e-4;
 /// Weight of the ground's squared difference from a plane under the foot: 5 mm are worth a step of 3 cm aside.
 const ROUGH: f64 = 36.0;
@@ -178,6 +178,7 @@ impl<'a> Search<'a> {
         let side = [-motion.in_world.y, motion.in_world.x];
         let spacing = self.contact.grid().spacing[0].min(self.contact.grid().spacing[1]);
         let steps = (WINDOW * motion.half_across(&reach.half_size) / spacing) as i64;
+        let crowded = self.model.size * self.model.size * NO_ROOM;
         (-steps..=steps)
             .filter_map(|k| {
                 let aside = k as f64 * spacing;
@@ -191,7 +192,7 @@ impl<'a> Search<'a> {
                     s,
                     cell,
                     point,
-                    cost: aside * aside + NO_ROOM * no_room + ROUGH * rough * rough,
+                    cost: aside * aside + crowded * no_room + ROUGH * rough * rough,
                 })
             })
             .min_by(|a, b| a.cost.total_cmp(&b.cost))

@@ -13,7 +13,7 @@ use crate::trajectory::space::Space;
 use crate::trajectory::{Gait, Spaces};
 use crate::{Error, Result};
 
-/// Cost of each touch-down for shorter cycles, m²: more steps are faster and less steady ones.
+/// Cost of each touch-down for shorter cycles, m², for a robot of ANYmal's size: more steps are faster and less steady ones.
 const MORE_STEPS: f64 = 0.1;
 
 /// Those of some gaits that have the steps whose footholds are given.
@@ -76,9 +76,10 @@ impl Steps {
             return Ok(Self { gait: gaits[chosen].1.clone(), patches: Vec::new(), others: Vec::new() });
         };
         let (mut found, mut refused) = (Vec::new(), None);
+        let more = robot.size().powi(2) * MORE_STEPS;
         for (factor, gait) in gaits {
             match footing(scenario, robot, surfaces, contact, gait, &[]) {
-                Ok((cost, gait, cells)) => found.push((cost + MORE_STEPS * (1.0 - factor), gait, cells)),
+                Ok((cost, gait, cells)) => found.push((cost + more * (1.0 - factor), gait, cells)),
                 // If none will do, what is wrong with the usual gait is reported.
                 Err(error) => refused = refused.or(Some(error)),
             }
