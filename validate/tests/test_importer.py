@@ -253,6 +253,23 @@ def short() -> str:
     return text.replace('"0.2 ', '"0.14 ').replace('"-0.2 ', '"-0.14 ')
 
 
+def test_legs_in_the_middle_bend_their_knees_alike(tmp_path: Path) -> None:
+    """Two legs, of hips a little before the base's origin or behind it, whose knees could bend either way."""
+    path = tmp_path / "biped.urdf"
+    for ahead in ("0.01", "-0.01"):
+        legs = "".join(
+            leg(name).replace("-2.7, -0.8", "").replace('lower="-2.7" upper="-0.8"', 'lower="-2.7" upper="2.7"')
+            for name in ("fl", "fr")
+        )
+        legs = legs.replace('lower="-3.0" upper="1.5"', 'lower="-3.0" upper="3.0"').replace('xyz="0.2 ', f'xyz="{ahead} ')
+        trunk = URDF[: URDF.index('<link name="fl_hip">')]
+        path.write_text(f"{trunk}{legs}</robot>")
+        found = importer.build(path, "biped", importer.arguments([str(path)]))
+        hips, knees = zip(*(robot_leg.stance[1:] for robot_leg in found.robot.legs), strict=True)
+        np.testing.assert_allclose(np.ptp([hips, knees], axis=1), 0.0, atol=1e-3)
+        assert hips[0] > 0.0 and knees[0] > 0.0  # about -y and y: ahead, and back
+
+
 def test_a_computed_stance_keeps_the_legs_apart(tmp_path: Path) -> None:
     path = tmp_path / "short.xml"
     knees = {}

@@ -17,6 +17,7 @@ from .skeleton import Leg, Skeleton
 STRETCH = 0.72  # height of the hip above the foot in a computed stance, in lengths of the leg from there: about ANYmal's
 LEAST_HEIGHT = 0.35  # of the hip above the foot in a keyframe that is taken for a stance, in the same lengths
 AT_LIMIT = 0.02  # rad inside its range that a computed stance keeps each joint
+BESIDE = 0.1  # of the length of a leg: hips nearer to the middle of the body are at its sides, not at an end
 CENTRAL = 0.4  # of half a reach box: how far a foot stands from its middle, along x and y
 REACHED = 1e-5  # m
 _STARTS = 6  # of the search along each of two joints …
@@ -74,7 +75,7 @@ def computed(legs: list[Leg]) -> list[list[Array]]:
     """Stances with each foot under its hip, all at one height, best first.
 
     The first has the joint angles nearest to the middle of their ranges; of equally near ones, those with the knees toward the middle of the
-    body. The others have all knees behind their feet, and all before them, where the ranges allow it.
+    body, or ahead where the hip is there. The others have all knees behind their feet, and all before them, where the ranges allow it.
     """
     hips = [leg.links[thigh(leg)].anchor for leg in legs]
     height = min(hip[2] - STRETCH * length(leg) - leg.radius for hip, leg in zip(hips, legs, strict=True))
@@ -154,6 +155,7 @@ def _under_hip(leg: Leg, target: Array) -> list[_Posture]:
     middle, half = (low + high) / 2, (high - low) / 2
     found = []
     bending = slice(thigh(leg), thigh(leg) + 2)
+    end = float(np.sign(target[0])) if abs(target[0]) > BESIDE * length(leg) else -1.0
     count = _STARTS if len(leg.links) <= 3 else _REDUNDANT_STARTS
     starts = [np.linspace(lo, hi, count + 2)[1:-1] for lo, hi in zip(low[bending], high[bending], strict=True)]
     for angles in product(*starts):
@@ -163,7 +165,7 @@ def _under_hip(leg: Leg, target: Array) -> list[_Posture]:
         if q is not None:
             _, frames = place(leg, q)
             knee = float(frames[thigh(leg) + 1][1][0] - target[0])
-            rank = float((((q - middle) / half) ** 2).sum()) + 1e-3 * float(np.sign(target[0])) * knee
+            rank = float((((q - middle) / half) ** 2).sum()) + 1e-3 * end * knee
             found.append(_Posture(q, rank, knee))
     if not found:
         raise InputError(
