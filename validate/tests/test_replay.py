@@ -9,6 +9,7 @@ import pytest
 
 import crawl
 from crawl import GRAVITY
+from warpgait import report
 from warpgait.collision import SelfCollision
 from warpgait.criteria import Verdict
 from warpgait.model import find_model, foot_names, indices, load_spec, stand
@@ -104,6 +105,20 @@ def test_a_hard_push_makes_the_robot_fall_and_the_report_says_when(standing_plan
     assert found.verdict is Verdict.FAIL
     first = found.first_failure
     assert first is not None and first.time is not None and 0.4 < first.time < 1.0
+
+
+@pytest.mark.parametrize("force", [3000.0, 1e12])
+def test_a_robot_that_falls_before_the_motion_begins_is_a_failure_with_all_files(
+    force: float, standing_plan: Path, tmp_path: Path
+) -> None:
+    disturbance = Disturbance(push=(-0.5, 0.4, 0.0, force, 0.0))
+    found = validate(read_plan(standing_plan), Settings(check=False, robust=False, disturbance=disturbance))
+    assert found.verdict is Verdict.FAIL
+    assert found.first_failure is not None and found.first_failure.time == 0.0
+    report.write_replay(found, tmp_path / "replay.npz")
+    with np.load(tmp_path / "replay.npz") as members:
+        assert len(members["t"]) == 1 and members["tau"].shape == members["q"].shape == (1, 12)
+        assert all(np.isfinite(members[name]).all() for name in ("q", "qd", "foot_force"))
 
 
 def test_a_simulation_that_blows_up_is_a_failure_not_a_crash(

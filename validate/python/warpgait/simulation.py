@@ -149,7 +149,9 @@ class Simulation:
         data.qvel[6:] = np.linalg.lstsq(feet[:, 6:], -feet[:, :6] @ data.qvel[:6], rcond=None)[0]
 
     def _control_period(self, step: int) -> None:
-        """One control step and its physics steps. Negative steps settle on the first sample of the reference and are not recorded."""
+        """One control step and its physics steps. Negative steps settle on the first sample of the reference; only one in which the robot
+        falls is recorded, so that a replay has at least one sample.
+        """
         k, time = max(step, 0), step * self._period
         self._push(time)
         touching = self._measure()
@@ -158,12 +160,14 @@ class Simulation:
         stray = self._step(sample)
         if self._blew_up():
             self._fall = Incident(max(time, 0.0), "the simulation blew up")
-            return
-        sample.slip = self._slip(k, sample.foot, touching)
+            sample.force[:] = 0.0  # it may be infinite
+        else:
+            sample.slip = self._slip(k, sample.foot, touching)
+            self._judge_fall(k, max(time, 0.0), sample.com)
         if step >= 0:
-            self._samples.append(sample)
             self._note_stray(time, stray)
-        self._judge_fall(k, max(time, 0.0), sample.com)
+        if step >= 0 or self._fall is not None:
+            self._samples.append(sample)
 
     def _push(self, time: float) -> None:
         """Apply the force of the disturbance, and those of the plan, to the base while they last."""
