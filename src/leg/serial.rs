@@ -29,7 +29,7 @@ const REACHED: f64 = 3e-3;
 const STEPS: usize = 60;
 const CONVERGED: f64 = 1e-9;
 /// Of the minimizations before with larger ε²: by which factors, and the size of their last steps, rad.
-const LARGER: [f64; 3] = [600.0, 70.0, 8.0];
+const LARGER: [f64; 4] = [2000.0, 200.0, 25.0, 3.0];
 const NEAR: f64 = 0.03;
 /// Most a joint turns in one step, rad.
 const LARGEST_TURN: f64 = 0.6;

@@ -186,20 +186,29 @@ def test_angles_of_knee_and_thigh_are_those_of_the_links() -> None:
                 assert leg.knee_angle(q[e]) == pytest.approx(np.arccos(cosine), abs=1e-6)
 
 
-def test_the_largest_cuboid_is_the_largest() -> None:
+@pytest.mark.parametrize("least", [(1, 1, 1), (3, 2, 2)])
+@pytest.mark.parametrize("held", [None, ((2, 1, 3), (2, 2, 4))])
+def test_the_largest_cuboid_is_the_largest(
+    least: tuple[int, int, int], held: tuple[tuple[int, int, int], tuple[int, int, int]] | None
+) -> None:
     rng = np.random.default_rng(0)
+    hold = None if held is None else (np.array(held[0]), np.array(held[1]))
     for _ in range(20):
-        mask = rng.random((5, 4, 6)) < 0.8
+        mask = rng.random((5, 4, 6)) < 0.85
         best = 0
-        for i0, j0, k0 in product(range(5), range(4), range(6)):
-            for i1, j1, k1 in product(range(i0, 5), range(j0, 4), range(k0, 6)):
-                if mask[i0 : i1 + 1, j0 : j1 + 1, k0 : k1 + 1].all():
-                    best = max(best, (i1 - i0 + 1) * (j1 - j0 + 1) * (k1 - k0 + 1))
-        found = largest_cuboid(mask)
-        assert found is not None
-        low, high = found
-        assert mask[low[0] : high[0] + 1, low[1] : high[1] + 1, low[2] : high[2] + 1].all()
-        assert np.prod(high - low + 1) == best
+        for low in product(range(5), range(4), range(6)):
+            for end in product(*(range(a + n, size + 1) for a, n, size in zip(low, least, mask.shape, strict=True))):
+                cells = tuple(slice(a, b) for a, b in zip(low, end, strict=True))
+                holds = hold is None or bool((np.array(low) <= hold[0]).all() and (hold[1] < np.array(end)).all())
+                if holds and mask[cells].all():
+                    best = max(best, int(np.prod(np.subtract(end, low))))
+        found = largest_cuboid(mask, least, hold)
+        assert (found is None) == (best == 0)
+        if found is not None:
+            first, last = found
+            assert mask[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))].all()
+            assert (last - first + 1 >= least).all() and np.prod(last - first + 1) == best
+            assert hold is None or ((first <= hold[0]).all() and (hold[1] <= last).all())
     assert largest_cuboid(np.zeros((2, 2, 2), bool)) is None
 
 

@@ -26,6 +26,9 @@ class ReachRules:
     clearance: float = 0.0  # m, between foot and trunk
 
 
+Cells = tuple[Integers, Integers]  # first and last index of a range along each axis
+
+
 @dataclass(frozen=True)
 class Box:
     """Axis-aligned, m."""
@@ -66,8 +69,10 @@ def _bends(leg: Leg, q: Array, rules: ReachRules) -> Bools:
     return bends
 
 
-def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:
-    """Area and inclusive bounds (area, i0, i1, j0, j1) of the largest all-true rectangle, by histograms and a stack, in O(cells)."""
+def largest_rectangle(mask: Bools, least: tuple[int, int] = (1, 1), hold: Cells | None = None) -> tuple[int, int, int, int, int]:
+    """Area and inclusive bounds (area, i0, i1, j0, j1) of the largest all-true rectangle with at least `least` cells along each axis and with
+    `hold` in it; the area is 0 if there is none. By histograms and a stack, in O(cells): they have all rectangles that cannot be extended.
+    """
     heights = np.zeros(mask.shape[1], int)
     best = (0, 0, 0, 0, 0)
     for i, row in enumerate(mask):
@@ -77,36 +82,46 @@ def largest_rectangle(mask: Bools) -> tuple[int, int, int, int, int]:
             start = j
             while stack and stack[-1][1] >= height:
                 start, h = stack.pop()
-                if h * (j - start) > best[0]:
-                    best = (h * (j - start), i - h + 1, i, start, j - 1)
+                bounds = (i - h + 1, i, start, j - 1)
+                if h * (j - start) > best[0] and h >= least[0] and j - start >= least[1] and _holds(bounds, hold):
+                    best = (h * (j - start), *bounds)
             stack.append((start, height))
     return best
 
 
-def largest_cuboid(mask: Bools, least: tuple[int, int, int] = (1, 1, 1)) -> tuple[Integers, Integers] | None:
-    """First and last index (3,) of the largest all-true cuboid with at least `least` cells along each axis, or None.
+def _holds(bounds: tuple[int, int, int, int], hold: Cells | None) -> bool:
+    i0, i1, j0, j1 = bounds
+    return hold is None or bool(i0 <= hold[0][0] and hold[1][0] <= i1 and j0 <= hold[0][1] and hold[1][1] <= j1)
+
+
+def largest_cuboid(
+    mask: Bools, least: tuple[int, int, int] = (1, 1, 1), hold: Cells | None = None
+) -> tuple[Integers, Integers] | None:
+    """First and last index (3,) of the largest all-true cuboid with at least `least` cells along each axis and with `hold` in it, or None.
 
     For each range of layers, it takes the largest rectangle in their intersection.
     """
     best, bounds = 0, None
     layers = mask.shape[2]
-    for z0 in range(layers):
+    for z0 in range(layers if hold is None else int(hold[0][2]) + 1):
         common = np.ones(mask.shape[:2], bool)
         for z1 in range(z0, layers):
             common &= mask[:, :, z1]
             if common.sum() * (layers - z0) <= best:
                 break
             thick = z1 - z0 + 1
-            if thick < least[2] or common.sum() * thick <= best:
+            if thick < least[2] or common.sum() * thick <= best or not (hold is None or hold[1][2] <= z1):
                 continue
-            area, i0, i1, j0, j1 = largest_rectangle(common)
-            if area * thick > best and i1 - i0 + 1 >= least[0] and j1 - j0 + 1 >= least[1]:
+            area, i0, i1, j0, j1 = largest_rectangle(common, least[:2], hold)
+            if area * thick > best:
                 best, bounds = area * thick, (np.array([i0, j0, z0]), np.array([i1, j1, z1]))
     return bounds
 
 
-def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float) -> Box | None:
-    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m; none if there is no such box.
+def reach_box(
+    leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float, hold: Box | None = None
+) -> Box | None:
+    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m, and with `hold` in it, if there is one.
 
     The grid points at both ends of the box are reached, so its edges are the distances between them.
     """
@@ -118,7 +133,16 @@ def reach_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Arr
         cells[1] = 2
         axes[1] = leg.hip[1] + leg.lateral + np.array([-rules.play, rules.play])
     mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
-    bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])))
+    held = None
+    if hold is not None:
+        low, high = hold.center - hold.half_size, hold.center + hold.half_size
+        held = (
+            np.array([np.searchsorted(axis, at, "right") - 1 for axis, at in zip(axes, low, strict=True)]),
+            np.array([np.searchsorted(axis, at, "left") for axis, at in zip(axes, high, strict=True)]),
+        )
+        if (held[0] < 0).any() or (held[1] >= mask.shape).any():
+            return None
+    bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])), held)
     if bounds is None:
         return None
     low, high = (np.array([axis[k] for axis, k in zip(axes, index, strict=True)]) for index in bounds)

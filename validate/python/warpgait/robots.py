@@ -196,9 +196,14 @@ def derive_from(name: str, spec: Any, known: ReachSet | None = None) -> Centroid
     nominal = data.site_xpos[index.site] - np.array([0, 0, index.radius]) - base
     reach = known or reach_of(name, spec)
     boxes = [Box(b.center - body.center_of_mass, b.half_size) for b in reach.boxes]
-    for foot, place, box in zip(feet, nominal, boxes, strict=True):
+    for e, (foot, place, box) in enumerate(zip(feet, nominal, boxes, strict=True)):
         room = np.minimum(LEAST_ROOM * reach.size, box.half_size / 2)
         if (np.abs(place - box.center) > box.half_size - room).any():
+            around = Box(place + body.center_of_mass, room)
+            found = _largest_box(legs(model, feet)[e], index.radius, trunk, reach.rules, reach.size, around)
+            if found is not None:
+                boxes[e] = Box(found.center - body.center_of_mass, found.half_size)
+                continue
             raise InputError(
                 f"{name}: foot {foot}: in the stance it is at {np.round(place, 3).tolist()} m, at the edge of its reach box or outside it, "
                 f"{np.round(box.center, 3).tolist()} ± {np.round(box.half_size, 3).tolist()} m; give another stance"
@@ -244,21 +249,24 @@ def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: f
                 boxes.append(mirrored)
                 break
         else:
-            boxes.append(_largest_box(name, leg, radius, trunk, rules, size))
+            largest = _largest_box(leg, radius, trunk, rules, size)
+            if largest is None:
+                least = np.round(LEAST_FRACTIONS[-1] * size * LEAST_BOX, 3).tolist()
+                raise InputError(f"{name}: leg {leg.name} reaches no box of {least} m within its joint limits")
+            boxes.append(largest)
     return ReachSet(tuple(boxes), rules, size)
 
 
-def _largest_box(name: str, leg: Leg, radius: float, trunk: Box, rules: ReachRules, size: float) -> Box:
-    """The largest box with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
+def _largest_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, size: float, hold: Box | None = None) -> Box | None:
+    """The largest box, with `hold` in it, with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
     resolution = RESOLUTION * size
     if isinstance(leg, SerialLeg):
         resolution = max(resolution, leg.span / (REDUNDANT_CELLS if is_redundant(leg) else SERIAL_CELLS))
     for fraction in LEAST_FRACTIONS:
-        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, resolution)
+        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, resolution, hold)
         if box is not None:
             return box
-    least = LEAST_FRACTIONS[-1] * size * LEAST_BOX
-    raise InputError(f"{name}: leg {leg.name} reaches no box of {np.round(least, 3).tolist()} m within its joint limits")
+    return None
 
 
 def _row(values: Array, digits: int = 3) -> str:

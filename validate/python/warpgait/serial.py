@@ -14,7 +14,7 @@ from .arrays import Array, Bools, Integers
 ROUNDING = 4e-3  # weight of the distance from the stance, in lengths of the leg: see the planner
 HALF_RANGE = (0.3, np.pi)  # rad, least and greatest half of a range in that
 # Factors of the squared weight in the minimizations that lead a leg of more than three joints to its posture.
-LARGER = (600.0, 70.0, 8.0)
+LARGER = (2000.0, 200.0, 25.0, 3.0)
 REACHED = 3e-3  # how far from its target a foot that is reached may be, in lengths of the leg
 REGULAR = 0.15  # least singular value of ∂foot/∂q in a regular posture, in lengths of the leg
 _STEPS, _LARGEST_TURN, _CONVERGED, _POLISHING = 60, 0.6, 1e-6, 4  # of the minimization; rad; rad; steps without the weight

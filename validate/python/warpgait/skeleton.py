@@ -23,6 +23,7 @@ FOOT_NAME = re.compile(r"foot|feet|toe|sole|contact|ankle|tip", re.IGNORECASE)
 GROUND_BAND = (
     0.35  # a leaf link whose lowest point is within this fraction of the robot's height above the lowest one may reach the ground
 )
+SOLE = 3  # so many equal spheres on the last link, or more, are a sole: the foot is at their middle
 MOST_FEET = 8
 _ALIGNED = 1e-6  # of the direction of a joint axis
 ON_THE_SPOT = 0.02  # of the leg: a foot whose center is nearer to the last axis is only turned by it
@@ -282,7 +283,13 @@ def foot_of(reader: Reader, leaf: int, named: set[str], radius: float | None) ->
     spheres = [g for g in geoms if shapes[g].kind == "sphere"]
     if spheres:
         g = max(spheres, key=lambda g: float(np.linalg.norm(shapes[g].center - anchor)))
-        return shapes[g].center, float(radius or shapes[g].size[0]), body, [g]
+        alike = [
+            s
+            for s in spheres
+            if reader.model.geom_bodyid[s] == reader.model.geom_bodyid[g] and shapes[s].size[0] == shapes[g].size[0]
+        ]
+        ends = alike if len(alike) >= SOLE else [g]
+        return np.mean([shapes[s].center for s in ends], axis=0), float(radius or shapes[g].size[0]), body, ends
     if geoms and (body != leaf or reader.name(leaf) in named):
         # A sphere of the size of the lowest shape, at its lower end.
         g = min(geoms, key=lambda g: shapes[g].lowest())
