@@ -15,8 +15,9 @@ pub const REACH_FRACTION: f64 = 0.5;
 pub const BASE_CLEARANCE: f64 = 0.01;
 /// Between knee or shank and the ground, m: for what happens between the samples, and the ground's curvature across the shank.
 pub const KNEE_CLEARANCE: f64 = 0.02;
-/// Between the shank's tube and ground with edges, m: the surface for it has a margin to the sides already.
-pub const SHANK_CLEARANCE: f64 = 0.01;
+/// Between the shank's tube and ground with edges, m: the surface for it has a margin to the sides already. The trunk moves by up to 11 mm
+/// against the center of mass, and swings that follow the edges closely leave nothing for what happens between the samples.
+pub const SHANK_CLEARANCE: f64 = 0.014;
 /// On each side of the height over the feet in `[posture]`, m: for what happens between the samples.
 pub const POSTURE_HEIGHT: f64 = 0.001;
 /// The same for roll and pitch, rad.
