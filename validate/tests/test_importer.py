@@ -270,6 +270,19 @@ def test_legs_in_the_middle_bend_their_knees_alike(tmp_path: Path) -> None:
         assert hips[0] > 0.0 and knees[0] > 0.0  # about -y and y: ahead, and back
 
 
+def test_equal_spheres_are_a_sole_whose_middle_is_the_foot(tmp_path: Path) -> None:
+    path, one = tmp_path / "dog.urdf", '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    sole = "".join(
+        one.replace("<geometry>", f'<origin xyz="{x} {y} 0"/><geometry>') for x in (-0.03, 0.05) for y in (-0.02, 0.02)
+    )
+    feet = []
+    for foot in (one, sole):
+        path.write_text(URDF.replace(one, foot))
+        found = importer.build(path, "dog", importer.arguments([str(path)]))
+        feet.append(np.array([robot_leg.foot for robot_leg in found.skeleton.legs]))
+    np.testing.assert_allclose(feet[1] - feet[0], [[0.01, 0.0, 0.0]] * 4, atol=1e-9)
+
+
 def test_a_computed_stance_keeps_the_legs_apart(tmp_path: Path) -> None:
     path = tmp_path / "short.xml"
     knees = {}
