@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -24,11 +26,16 @@ CYCLE, CYCLE_LENGTH = (
     1.2,
     0.6125,
 )  # s, m: the cycle of ANYmal C and the length of its legs; cycles grow with the root of the length
+SWING_TRAVEL = (
+    6.0  # rad: a cycle is at least this over the speed limit of the slowest joint, which turns about 1.2 rad in a swing of a walk
+)
 STANCE_ROUNDS = 4  # of stance and reach boxes
 TRIM = 0.25  # of the foot's radius: a shape of the shank that is not at least this much higher than the foot's lowest point is left out
 SAME = 1e-2  # rad: stances that differ less are the same
 SAMPLES = 300  # postures in which parts of the robot may hit each other
 MIDDLE = 0.5  # of half a reach box: how far a foot is from its middle in them
+_FRONT = re.compile("front|fore", re.IGNORECASE)
+_REAR = re.compile("rear|hind|back", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,16 @@ class Imported:
     robot: CentroidalRobot
     skeleton: Skeleton
     source: str  # of the stance
+
+
+def is_backward(legs: list[Leg], feet: list[Array]) -> bool:
+    """Whether the legs whose links are called front stand behind those that are called rear, hind or back."""
+    ends: dict[bool, list[float]] = {True: [], False: []}
+    for leg, foot in zip(legs, feet, strict=True):
+        words = " ".join([leg.foot_body, *(name for link in leg.links for name in (link.body, link.joint))])
+        if _FRONT.search(words) or _REAR.search(words):
+            ends[bool(_FRONT.search(words))].append(float(foot[0]))
+    return bool(ends[True] and ends[False]) and max(ends[True]) < min(ends[False])
 
 
 def _shape_at(shape: Shape, link: Link, frame: tuple[Array, Array]) -> Shape:
@@ -100,8 +117,15 @@ def assemble(skeleton: Skeleton, name: str, q: list[Array], source: str, words: 
     skeleton.base = _trunk(skeleton.base, skeleton.legs, skeleton.notes)
     q, feet = [q[e] for e in sequence], [feet[e] for e in sequence]
     lengths = [stances.length(leg) for leg in skeleton.legs]
-    cycle = round(20 * CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH))) / 20
+    slowest = min(link.limits.speed or np.inf for leg in skeleton.legs for link in leg.links)
+    cycle = round(20 * max(CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH)), SWING_TRAVEL / slowest)) / 20
     names = foot_names(feet)
+    if SWING_TRAVEL / slowest > CYCLE * float(np.sqrt(min(lengths) / CYCLE_LENGTH)):
+        skeleton.notes.append(
+            f"a cycle takes {cycle:g} s, because the slowest joint turns at {slowest:g} rad/s at most; --speed-limit gives other limits"
+        )
+    if is_backward(skeleton.legs, feet):
+        skeleton.notes.append("by the names of its legs, the robot looks the other way; --forward says which way is ahead")
 
     def model_in(q: list[Array]) -> tuple[str, Any]:
         feet = [stances.place(leg, angles)[0] for leg, angles in zip(skeleton.legs, q, strict=True)]
@@ -129,27 +153,28 @@ def assemble_freest(skeleton: Skeleton, name: str, alternatives: list[list[Array
     first = assemble(skeleton, name, alternatives[0], "computed", words)
     found = [(self_collisions(first), first)]
     for q in alternatives[1:]:
-        if found[-1][0] == 0:
+        if not found[-1][0]:
             break
         if not np.allclose(q, alternatives[0], atol=SAME):
             with suppress(InputError):
                 robot = assemble(skeleton, name, q, "computed", words)
                 found.append((self_collisions(robot), robot))
-    hits, best = min(found, key=lambda pair: pair[0])
+    hits, best = min(found, key=lambda pair: len(pair[0]))
     if best is not found[0][1]:
         best.skeleton.notes.append(
-            f"all knees bend the same way; with the joints nearer to the middle of their ranges, parts of the robot hit each other in {found[0][0]} of "
-            f"{SAMPLES} postures"
+            f"all knees bend the same way; with the joints nearer to the middle of their ranges, parts of the robot hit each other in {len(found[0][0])} "
+            f"of {SAMPLES} postures"
         )
-    if hits > 0:
+    if hits:
         best.skeleton.notes.append(
-            f"in {hits} of {SAMPLES} postures around the stance, parts of the robot hit each other; --stance gives another"
+            f"in {len(hits)} of {SAMPLES} postures around the stance, parts of the robot hit each other, mostly {Counter(hits).most_common(1)[0][0]}; "
+            "--stance gives another"
         )
     return best
 
 
-def self_collisions(imported: Imported) -> int:
-    """Of random postures with each foot around the middle of its reach box: in how many do parts of the robot hit each other?"""
+def self_collisions(imported: Imported) -> list[str]:
+    """Of random postures with each foot around the middle of its reach box: what hits what in those in which parts of the robot hit each other."""
     spec, robot = mujoco.MjSpec.from_string(imported.model), imported.robot
     model = spec.compile()
     index = indices(model, robot.feet)
@@ -158,7 +183,8 @@ def self_collisions(imported: Imported) -> int:
     for leg, box, joints in zip(legs_in(model, robot.feet), robot.reach, index.qpos, strict=True):
         centers = _around(box, random) + robot.body.center_of_mass + [0, 0, robot.radius]
         qpos[:, joints] = leg.inverse(centers)[0]
-    return len(SelfCollision(spec, index).find(np.linspace(0, PERIOD * (SAMPLES - 1), SAMPLES), qpos))
+    times = np.linspace(0, PERIOD * (SAMPLES - 1), SAMPLES)
+    return [incident.what for incident in SelfCollision(spec, index).find(times, qpos)]
 
 
 def _around(box: Box, random: np.random.Generator) -> Array:

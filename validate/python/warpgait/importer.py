@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -25,8 +26,9 @@ from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import ensure_outputs, write_text
 from .model import check_mujoco
+from .read_mjcf import read_mjcf, refuse_loops
 from .robots import CentroidalRobot, to_toml
-from .skeleton import Link, Reader, Skeleton, find_feet, leg_of
+from .skeleton import Leg, Link, Reader, Skeleton, find_feet, leg_of
 from .text import is_name, visible
 from .urdf import Limits, read_urdf
 
@@ -51,12 +53,12 @@ def read(path: Path, options: argparse.Namespace) -> Skeleton:
     mimics: dict[str, str] = {}
     limits: dict[str, Limits] | None = None
     if tag == "robot":
-        urdf = read_urdf(path, content, options.without_meshes)
+        urdf = read_urdf(path, content, options.without_meshes, options.mend_inertias)
         notes, mimics, limits = urdf.notes, urdf.mimics, urdf.limits
         model = _compile(path, lambda: _floating(urdf.text))
     elif tag == "mujoco":
-        model = _compile(path, lambda: _without_visuals(path, options.without_meshes, notes))
-        _refuse_loops(path, model)
+        model = _compile(path, lambda: read_mjcf(path, options.without_meshes, options.mend_inertias, notes))
+        refuse_loops(path, model)
         limits = _limits_of(model)
     else:
         raise InputError(f"{path}: the root element is <{visible(tag)}>; allowed: <robot> (URDF) or <mujoco> (MJCF)")
@@ -68,6 +70,8 @@ def _compile(path: Path, make: Any) -> Any:
     """The compiled model; what MuJoCo objects to is the user's error."""
     try:
         return make().compile()
+    except InputError:
+        raise
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
 
@@ -77,31 +81,6 @@ def _floating(text: str) -> Any:
     spec = mujoco.MjSpec.from_string(text)
     spec.worldbody.first_body().add_freejoint()
     return spec
-
-
-def _without_visuals(path: Path, without_meshes: bool, notes: list[str]) -> Any:
-    """The model of an MJCF without shapes that touch nothing, whose meshes need not be there; `without_meshes`: without all meshes."""
-    spec = mujoco.MjSpec.from_file(str(path))
-    mesh = int(mujoco.mjtGeom.mjGEOM_MESH)
-    for geom in [g for g in spec.geoms if int(g.type) == mesh]:
-        collides = bool(geom.contype or geom.conaffinity)
-        has_mass = geom.parent.explicitinertial == 0
-        if collides and without_meshes:
-            notes.append(f'link "{geom.parent.name}": its collision mesh {geom.meshname} is left out')
-        if (without_meshes or not collides) and not has_mass:
-            spec.delete(geom)
-    used = {g.meshname for g in spec.geoms if int(g.type) == mesh}
-    for unused in [m for m in spec.meshes if m.name not in used]:
-        spec.delete(unused)
-    return spec
-
-
-def _refuse_loops(path: Path, model: Any) -> None:
-    loops = [int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)]
-    for e in range(model.neq):
-        if model.eq_type[e] in loops and model.eq_active0[e]:
-            name = model.equality(e).name or f"number {e}"
-            raise InputError(f'{path}: equality "{name}": closed loops are not supported; remove it')
 
 
 def _limits_of(model: Any) -> dict[str, Limits]:
@@ -195,6 +174,8 @@ def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
     reader.pose()
     radius = options.foot_radius
     legs = [leg_of(reader, leaf, set(wanted), radius) for leaf in leaves]
+    base = reader.link(reader.base, None)
+    _judge_gyration(reader.path, base, legs)
     counts = {len(leg.links) for leg in legs}
     if len(counts) > 1:
         each = ", ".join(f'"{leg.foot_body}" {len(leg.links)}' for leg in legs)
@@ -209,23 +190,41 @@ def _skeleton(reader: Reader, options: argparse.Namespace) -> Skeleton:
     if any(leg.radius < 0.99 * largest for leg in legs):
         reader.notes.append(f"the feet differ; all get the largest radius, {largest:.4g} m")
     legs = [replace(leg, radius=largest) for leg in legs]
-    return Skeleton(reader.path, reader.link(reader.base, None), legs, reader.notes, key)
+    return Skeleton(reader.path, base, legs, reader.notes, key)
+
+
+def _judge_gyration(path: Path, base: Link, legs: list[Leg]) -> None:
+    """Refuse a link whose inertia is that of something larger than the robot, such as 1 kg m² for everything."""
+    places = [leg.foot for leg in legs] + [link.anchor for leg in legs for link in leg.links]
+    places += [corner for shape in base.shapes for corner in shape.corners()]
+    extent = float(np.linalg.norm(np.ptp(places, axis=0)))
+    for link in [base, *(link for leg in legs for link in leg.links)]:
+        moment = float(np.linalg.eigvalsh(link.inertia)[-1])
+        gyration = float(np.sqrt(moment / link.mass))
+        if gyration > extent:
+            raise InputError(
+                f'{path}: link "{link.body}": a moment of inertia of {moment:.3g} kg m² with {link.mass:.3g} kg, so that its mass is {gyration:.2g} m from its '
+                f"middle, and the whole robot is {extent:.2g} m long; put its inertia right"
+            )
 
 
 def _limited(reader: Reader, link: Link, k: int, options: argparse.Namespace) -> Link:
     """The link with limits from the options where the file has none; refuses one that is left without."""
     limits = replace(link.limits)
+    absent, flags = [], []
     for name, flag, unit in (("speed", "--speed-limit", "RAD/S"), ("torque", "--torque-limit", "NM")):
         given = options.speed_limit if name == "speed" else options.torque_limit
         if given:
             setattr(limits, name, given[min(k, len(given) - 1)])
         if not (getattr(limits, name) or 0) > 0:
-            raise InputError(
-                f'{reader.path}: joint "{link.joint}": the file has no {name} limit; give it: {flag} {unit}, or one for each joint of a leg from the base down: {flag} A,B,…'
-            )
+            absent.append(f"{name} limit")
+            flags.append(f"{flag} {unit}, or one for each joint of a leg from the base down: {flag} A,B,…")
     if limits.range is None and options.range is None:
+        absent.append("range")
+        flags.append("--range LEAST,GREATEST, rad, for all joints without one")
+    if absent:
         raise InputError(
-            f'{reader.path}: joint "{link.joint}": it has no limits; give them for such joints: --range LEAST,GREATEST, rad'
+            f'{reader.path}: joint "{link.joint}": the file has no {" and no ".join(absent)}; give it: {"; and ".join(flags)}'
         )
     if limits.range is None:
         limits.range = (options.range[0], options.range[1])
@@ -279,6 +278,17 @@ def _numbers(text: str) -> list[float]:
     return values
 
 
+def _joined(words: list[str]) -> list[str]:
+    """The words of a command line, with values that begin with a minus, which would be taken for options, joined to theirs: --range=-3,3."""
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in ("--range", "--stance", "--forward") and word[:1] == "-" and word[:2] != "--":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 def arguments(words: list[str] | None) -> argparse.Namespace:
     """The options of the command."""
     parser = Parser(prog="warpgait robot import", description="From a URDF or MJCF to NAME.toml and NAME.xml.")
@@ -322,10 +332,13 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
         help="hold a joint still at an angle, rad (default: that of the keyframe, or as near to zero as it goes); with * for a part of the name, several",
     )
     parser.add_argument("--without-meshes", action="store_true", help="leave out collision shapes whose meshes are not there")
+    parser.add_argument(
+        "--mend-inertias", action="store_true", help="put the nearest inertia that a body has in the place of impossible ones"
+    )
     parser.add_argument("--source", help="where the file is from and its license, for the two files")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
-    options = parser.parse_args(words)
+    options = parser.parse_args(_joined(sys.argv[1:] if words is None else words))
     if options.range is not None and len(options.range) != 2:
         parser.error(f"--range: {len(options.range)} numbers; allowed: 2")
     if options.foot_radius is not None and not 1e-3 <= options.foot_radius <= 1:

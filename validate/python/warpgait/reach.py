@@ -42,6 +42,7 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
     s, c = np.sin(rules.tilt), np.cos(rules.tilt)
     points = contact.reshape(-1, 3)
     ok = np.linalg.norm(points - leg.hip, axis=1) <= leg.span + radius
+    ok &= points[:, 2] < trunk.center[2] - trunk.half_size[2]  # level ground any higher is in the trunk
     for axis in range(2):  # a leg in the middle has no side
         if abs(leg.hip[axis]) > rules.side:
             ok &= points[:, axis] * np.sign(leg.hip[axis]) > rules.side

@@ -15,6 +15,7 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError
+from .inertia import nearest_inertia
 from .model import JOINT_COUNTS, PITCH_ONLY, SAGITTAL, merged
 from .shapes import boxes_around
 from .urdf import Limits
@@ -160,20 +161,34 @@ class Reader:
         if kind in names:
             size = m.geom_size[g][: 1 if names[kind] == "sphere" else 2].copy()
             return Shape(names[kind], place, rotation, size)
+        if kind == int(kinds.mjGEOM_MESH):
+            points, rotation = self._vertices(g)
+            low, high = points.min(0), points.max(0)
+            return Shape("box", place + rotation @ ((low + high) / 2), rotation, np.maximum((high - low) / 2, 1e-4))
         box = m.geom_aabb[g]
         return Shape("box", place + rotation @ box[:3], rotation, np.maximum(box[3:], 1e-4))
+
+    def _vertices(self, g: int) -> tuple[Array, Array]:
+        """Vertices of a mesh in its file's axes, from the geom's place, and those axes in the world. (MuJoCo turns a mesh into its principal axes,
+        which are arbitrary for one that is nearly round.)"""
+        m, mesh = self.model, int(self.model.geom_dataid[g])
+        turned = np.zeros(9)
+        mujoco.mju_quat2Mat(turned, m.mesh_quat[mesh])
+        first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
+        turn = turned.reshape(3, 3)
+        points: Array = m.mesh_vert[first : first + count].astype(float) @ turn.T
+        return points, self.data.geom_xmat[g].reshape(3, 3) @ turn.T
 
     def shapes(self, g: int) -> list[Shape]:
         """A geom as one or more primitives: a mesh as boxes around parts of its convex hull."""
         m, whole = self.model, self.shape(g)
         if int(m.geom_type[g]) != int(mujoco.mjtGeom.mjGEOM_MESH):
             return [whole]
-        first, count = int(m.mesh_vertadr[m.geom_dataid[g]]), int(m.mesh_vertnum[m.geom_dataid[g]])
         place = self.data.geom_xpos[g] - self.data.xpos[self.base]
-        boxes = boxes_around(m.mesh_vert[first : first + count].astype(float))
+        points, rotation = self._vertices(g)
         return [
-            Shape("box", place + whole.rotation @ ((low + high) / 2), whole.rotation, np.maximum((high - low) / 2, 1e-4))
-            for low, high in boxes
+            Shape("box", place + rotation @ ((low + high) / 2), rotation, np.maximum((high - low) / 2, 1e-4))
+            for low, high in boxes_around(points)
         ]
 
     def freeze(self, joint: int, angle: float) -> None:
@@ -205,6 +220,8 @@ class Reader:
             )
         if moments[2] > (moments[0] + moments[1]) * (1 + _INERTIA_ROUNDING):
             raise InputError(f'{self.path}: link "{name}": no body has the principal moments of inertia {moments} kg m²')
+        if moments[2] > moments[0] + moments[1]:
+            inertia = nearest_inertia(inertia)
         return Link(
             body=name,
             joint="" if joint is None else self.joint_name(joint),

@@ -17,6 +17,7 @@ import numpy as np
 
 from .arrays import Array
 from .errors import InputError
+from .inertia import MENDED, nearest_inertia
 from .shapes import boxes_around, mesh_points
 
 LEAST_MASS = (
@@ -27,6 +28,27 @@ LIGHT = 0.02  # of the robot's mass: a link that is fixed to another and lighter
 MOMENT_ROUNDING = (
     0.01  # by how much a principal moment may exceed the sum of the other two, as a fraction: files have rounded numbers
 )
+_SINGLE = (
+    "origin",
+    "axis",
+    "parent",
+    "child",
+    "limit",
+    "mimic",
+    "inertial",
+    "mass",
+    "inertia",
+    "geometry",
+)  # at most one in an element
+_VECTORS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {"scale": 3},
+}  # how many numbers the attributes of an element have
+_SIZED = ("box", "sphere", "cylinder", "capsule")
 
 
 @dataclass
@@ -48,8 +70,9 @@ class Urdf:
     notes: list[str] = field(default_factory=list)
 
 
-def read_urdf(path: Path, content: bytes, without_meshes: bool) -> Urdf:
-    """Read a URDF. `without_meshes`: collision shapes whose meshes are not there are left out instead of refused."""
+def read_urdf(path: Path, content: bytes, without_meshes: bool, mend_inertias: bool = False) -> Urdf:
+    """Read a URDF. `without_meshes`: collision shapes whose meshes are not there are left out instead of refused; `mend_inertias`: impossible
+    inertias are replaced."""
     try:
         root = ET.fromstring(content)
     except ET.ParseError as error:
@@ -59,15 +82,20 @@ def read_urdf(path: Path, content: bytes, without_meshes: bool) -> Urdf:
     if any("xacro" in element.tag or any("${" in value for value in element.attrib.values()) for element in root.iter()):
         raise InputError(f"{path}: this is xacro, not URDF; expand it first: xacro {path.name} > robot.urdf")
     links = _links(path, root)
+    _judge_elements(path, root)
     _unfasten(path, root, links, _tree(path, root, links))
     found = Urdf("")
     rigid = _rigid(root)
     total = sum(_mass(path, link) for link in links.values())
+    mended = []
     for link in links.values():
-        _inertial(path, link, rigid, total, found.notes)
+        if _inertial(path, link, rigid, total, mend_inertias, found.notes):
+            mended.append(f'"{link.attrib["name"]}"')
         for visual in link.findall("visual"):
             link.remove(visual)
         _collisions(path, link, without_meshes, found.notes)
+    if mended:
+        found.notes.append(f"link {', '.join(mended)}: {MENDED}")
     for joint in root.findall("joint"):
         _joint(path, joint, found)
     for extra in ("transmission", "gazebo", "mujoco", "sensor"):
@@ -90,6 +118,45 @@ def _links(path: Path, root: ET.Element) -> dict[str, ET.Element]:
     if not links:
         raise InputError(f"{path}: there are no links")
     return links
+
+
+def _judge_elements(path: Path, root: ET.Element) -> None:
+    """Refuse what a link or joint has twice, and places, axes and sizes that are none. MuJoCo's messages have no names and lines of another text."""
+    for owner in [*root.findall("link"), *root.findall("joint")]:
+        where = f'{owner.tag} "{owner.attrib.get("name", "")}"'
+        seen = [part for part in owner if part.tag != "visual"]  # visual shapes are left out
+        for element in [owner, *(e for part in seen for e in part.iter())]:
+            _judge_element(path, where, element)
+        axis = owner.find("axis")
+        moves = owner.attrib.get("type") in ("revolute", "continuous", "prismatic")
+        if moves and axis is not None and not np.any(_vector(path, where, axis, "xyz", 3)):
+            raise InputError(f"{path}: {where}: its axis has no direction: {axis.attrib['xyz']}")
+
+
+def _judge_element(path: Path, where: str, element: ET.Element) -> None:
+    for tag in _SINGLE:
+        found = element.findall(tag)
+        if any(ET.tostring(other).split() != ET.tostring(found[0]).split() for other in found[1:]):
+            raise InputError(f"{path}: {where}: there are {len(found)} different <{tag}> in one <{element.tag}>; allowed: 1")
+        for other in found[1:]:
+            element.remove(other)
+    for key, count in _VECTORS.get(element.tag, {}).items():
+        if element.attrib.get(key):
+            _vector(path, where, element, key, count)
+
+
+def _vector(path: Path, where: str, element: ET.Element, key: str, count: int) -> Array:
+    text = element.attrib.get(key) or "1 0 0"
+    try:
+        values = np.array(text.split(), float)
+    except ValueError:
+        values = np.array([])
+    if values.shape != (count,) or not np.isfinite(values).all():
+        numbers = "1 number" if count == 1 else f"{count} numbers"
+        raise InputError(f'{path}: {where}: <{element.tag}> has {key} = "{text}"; allowed: {numbers}')
+    if element.tag in _SIZED and (values <= 0).any():
+        raise InputError(f'{path}: {where}: <{element.tag}> has {key} = "{text}"; allowed: above 0')
+    return values
 
 
 def _tree(path: Path, root: ET.Element, links: dict[str, ET.Element]) -> str:
@@ -162,29 +229,38 @@ def _mass(path: Path, link: ET.Element) -> float:
     return value
 
 
-def _inertial(path: Path, link: ET.Element, rigid: set[str], total: float, notes: list[str]) -> None:
-    """Refuse inertias that no body has. A light link that is fixed to another is taken for a point mass then."""
+def _inertial(path: Path, link: ET.Element, rigid: set[str], total: float, mend: bool, notes: list[str]) -> bool:
+    """Refuse inertias that no body has, or `mend` them; returns whether it did. A light link that is fixed to another is taken for a point mass then."""
     name = link.attrib["name"]
     where = f'link "{name}"'
     inertial, mass = link.find("inertial"), _mass(path, link)
     if inertial is None:
-        return
+        return False
     tensor = inertial.find("inertia")
     if mass < NO_MASS:
         link.remove(inertial)
-        return
+        return False
     light = name in rigid and mass <= LIGHT * total
     if tensor is None:
         raise InputError(f"{path}: {where}: it has a mass but no inertia")
     xx, yy, zz, xy, xz, yz = (_number(path, where, tensor, f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz"))
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = np.linalg.eigvalsh(inertia)
     rounding = MOMENT_ROUNDING * abs(moments).sum()
     if moments[0] < -rounding or moments[2] > moments[0] + moments[1] + rounding:
         what = f"no body has the principal moments of inertia {_words(moments)} kg m²"
+        if mend:
+            nearest = nearest_inertia(inertia)
+            tensor.attrib.update({f"i{'xyz'[i]}{'xyz'[j]}": f"{nearest[i, j]:.9g}" for i in range(3) for j in range(i, 3)})
+            return True
         if not light:
-            raise InputError(f"{path}: {where}: {what}; none may be negative, nor larger than the sum of the other two")
+            raise InputError(
+                f"{path}: {where}: {what}; none may be negative, nor larger than the sum of the other two. Put it right, or take the nearest that a body "
+                "has: --mend-inertias"
+            )
         notes.append(f"{where}: {what}; it is taken for a point mass")
         tensor.attrib.update(ixx="0", iyy="0", izz="0", ixy="0", ixz="0", iyz="0")
+    return False
 
 
 def _words(values: Any) -> str:
