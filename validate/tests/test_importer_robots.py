@@ -152,6 +152,11 @@ ELEMENTS: dict[str, tuple[Callable[[str], str], list[str]]] = {
     "two axes": (swap('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><axis xyz="0 1 0"/>'), ['"fl_pitch"', "2 different <axis>"]),
     "a flat box": (swap('<box size="0.03 0.03 0.18"/>', '<box size="0.03 0 0.18"/>'), ['"fl_thigh"', "size"]),
     "a ball of no size": (swap('<sphere radius="0.02"/>', '<sphere radius="0"/>'), ['"fl_foot"', "radius"]),
+    "a ball without a size": (swap('<sphere radius="0.02"/>', "<sphere/>"), ['"fl_foot"', "no radius"]),
+    "no shape": (swap('<sphere radius="0.02"/>', ""), ['"fl_foot"', "nothing"]),
+    "an unknown shape": (swap('<sphere radius="0.02"/>', '<torus r="1"/>'), ['"fl_foot"', "<torus>"]),
+    "two joints of one name": (swap('name="fl_knee"', 'name="fr_knee"'), ['"fr_knee"', "no other joint"]),
+    "a joint without a name": (swap('<joint name="fl_knee" ', "<joint "), ["every joint needs a name"]),
     "a mesh scaled by two numbers": (
         swap('<sphere radius="0.02"/>', '<mesh filename="a.stl" scale="1 1"/>'),
         ['"fl_foot"', "scale", "3 numbers"],
@@ -207,6 +212,13 @@ def test_legs_whose_names_look_backward_are_noticed(tmp_path: Path) -> None:
     for forward, backward in (("x", False), ("-x", True)):
         legs = skeleton_of(path, "--forward", forward).legs
         assert is_backward(legs, [robot_leg.foot for robot_leg in legs]) == backward
+
+
+def test_parts_that_hit_each_other_in_a_given_stance_are_noted(tmp_path: Path) -> None:
+    path = tmp_path / "dog.urdf"
+    path.write_text(URDF.replace('<cylinder radius="0.01" length="0.16"/>', '<box size="0.02 0.3 0.02"/>'))
+    found = importer.build(path, "dog", importer.arguments([str(path), "--stance", "0,-0.7,-1.4"]))
+    assert any("in the stance" in note and "hits" in note for note in found.skeleton.notes), found.skeleton.notes
 
 
 def test_contact_points_are_below_the_trunk(tmp_path: Path) -> None:

@@ -187,6 +187,16 @@ def self_collisions(imported: Imported) -> list[str]:
     return [incident.what for incident in SelfCollision(spec, index).find(times, qpos)]
 
 
+def note_hits(imported: Imported) -> Imported:
+    """Note what hits what in a stance that was not computed."""
+    spec = mujoco.MjSpec.from_string(imported.model)
+    model = spec.compile()
+    stance = np.tile(model.key("stand").qpos, (2, 1))
+    for incident in SelfCollision(spec, indices(model, imported.robot.feet)).find(np.array([0, PERIOD]), stance)[:1]:
+        imported.skeleton.notes.append(f"in the stance ({imported.source}), {incident.what}; --stance gives another")
+    return imported
+
+
 def _around(box: Box, random: np.random.Generator) -> Array:
     """Points (SAMPLES, 3) around the middle of a box."""
     points: Array = box.center + MIDDLE * box.half_size * random.uniform(-1, 1, (SAMPLES, 3))

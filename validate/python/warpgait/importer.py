@@ -21,7 +21,7 @@ import numpy as np
 from . import stance as stances
 from .arguments import Parser
 from .arrays import Array
-from .assemble import Imported, assemble, assemble_freest
+from .assemble import Imported, assemble, assemble_freest, note_hits
 from .console import ERROR, complain, emit, run
 from .errors import InputError
 from .files import ensure_outputs, write_text
@@ -239,10 +239,10 @@ def build(path: Path, name: str, options: argparse.Namespace) -> Imported:
     skeleton = read(path, options)
     words = options.source or f"from {path.name}"
     if options.stance:
-        return assemble(skeleton, name, stances.given(skeleton, options.stance), "--stance", words)
+        return note_hits(assemble(skeleton, name, stances.given(skeleton, options.stance), "--stance", words))
     found = stances.of_key(skeleton)
     if found is not None and stances.stands(skeleton.legs, found):
-        return assemble(skeleton, name, found, "keyframe", words)
+        return note_hits(assemble(skeleton, name, found, "keyframe", words))
     if found is not None:
         skeleton.notes.append(
             "the keyframe is not a stance, because not all of its feet are well below the hips; a stance is computed instead"

@@ -140,7 +140,12 @@ def _judge_element(path: Path, where: str, element: ET.Element) -> None:
             raise InputError(f"{path}: {where}: there are {len(found)} different <{tag}> in one <{element.tag}>; allowed: 1")
         for other in found[1:]:
             element.remove(other)
+    if element.tag == "geometry" and not (len(element) == 1 and element[0].tag in (*_SIZED, "mesh")):
+        given = ", ".join(f"<{shape.tag}>" for shape in element) or "nothing"
+        raise InputError(f"{path}: {where}: a collision shape is {given}; allowed: one of {', '.join((*_SIZED, 'mesh'))}")
     for key, count in _VECTORS.get(element.tag, {}).items():
+        if element.tag in _SIZED and key not in element.attrib:
+            raise InputError(f"{path}: {where}: <{element.tag}> has no {key}")
         if element.attrib.get(key):
             _vector(path, where, element, key, count)
 
@@ -162,8 +167,12 @@ def _vector(path: Path, where: str, element: ET.Element, key: str, count: int) -
 def _tree(path: Path, root: ET.Element, links: dict[str, ET.Element]) -> str:
     """Refuse links that do not form a tree; returns the root link."""
     parent_of: dict[str, str] = {}
+    joints: set[str] = set()
     for joint in root.findall("joint"):
         name = joint.attrib.get("name", "")
+        if not name or name in joints:
+            raise InputError(f'{path}: joint "{name}": every joint needs a name that no other joint has')
+        joints.add(name)
         ends = [joint.find(end) for end in ("parent", "child")]
         names = ["" if end is None else end.attrib.get("link", "") for end in ends]
         for end, link in zip(("parent", "child"), names, strict=True):
