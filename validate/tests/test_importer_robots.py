@@ -175,9 +175,10 @@ def test_elements_of_a_urdf_that_are_none_are_refused_by_name(
     assert all(word in message for word in words), message
 
 
-def test_what_a_urdf_says_twice_alike_counts_once(tmp_path: Path) -> None:
+def test_what_a_urdf_says_twice_alike_counts_once_and_what_is_not_its_own_not(tmp_path: Path) -> None:
     path, axis = tmp_path / "dog.urdf", '<axis xyz="0 -1 0"/>'
-    path.write_text(URDF.replace(axis, axis + axis))
+    extra = '<collision_checking><capsule name="test"/></collision_checking>'  # of another program
+    path.write_text(URDF.replace(axis, axis + axis).replace("</inertial>", f"</inertial>{extra}"))
     assert len(skeleton_of(path).legs) == 4
 
 

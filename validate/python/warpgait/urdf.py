@@ -124,7 +124,7 @@ def _judge_elements(path: Path, root: ET.Element) -> None:
     """Refuse what a link or joint has twice, and places, axes and sizes that are none. MuJoCo's messages have no names and lines of another text."""
     for owner in [*root.findall("link"), *root.findall("joint")]:
         where = f'{owner.tag} "{owner.attrib.get("name", "")}"'
-        seen = [part for part in owner if part.tag != "visual"]  # visual shapes are left out
+        seen = [part for part in owner if part.tag in ("inertial", "collision", "origin")]  # others are left out, or judged later
         for element in [owner, *(e for part in seen for e in part.iter())]:
             _judge_element(path, where, element)
         axis = owner.find("axis")
