@@ -12,6 +12,7 @@ import numpy as np
 
 from .arrays import Array, Bools, Integers
 from .kinematics import Leg, PlanarLeg, is_redundant
+from .serial import SerialLeg
 
 
 @dataclass(frozen=True)
@@ -42,23 +43,36 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
     s, c = np.sin(rules.tilt), np.cos(rules.tilt)
     points = contact.reshape(-1, 3)
     ok = np.linalg.norm(points - leg.hip, axis=1) <= leg.span + radius
-    ok &= points[:, 2] < trunk.center[2] - trunk.half_size[2]  # level ground any higher is in the trunk
-    for axis in range(2):  # a leg in the middle has no side
-        if abs(leg.hip[axis]) > rules.side:
-            ok &= points[:, axis] * np.sign(leg.hip[axis]) > rules.side
+    for axis in range(3):
+        ok &= _on_its_side(leg, axis, points[:, axis], trunk, rules)
     for normal in ([0, 0, 1], [s, 0, c], [-s, 0, c], [0, s, c], [0, -s, c]):
         left = np.flatnonzero(ok)
         center = points[left] + radius * np.asarray(normal, float)
         gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
         clear = (gap > 0).any(-1)
+        if isinstance(leg, SerialLeg):  # whose inverse kinematics takes long
+            clear[clear] = leg.may_reach(center[clear])
         ok[left[~clear]] = False
         left, center = left[clear], center[clear]
-        q, possible = leg.inverse(center)
-        ok[left] = (
-            possible & leg.within_limits(q) & _bends(leg, q, rules) & (leg.thigh_angle(q) <= rules.flexion) & leg.is_regular(q)
-        )
+        q, good = leg.inverse(center)
+        good &= leg.within_limits(q)
+        good[good] = _bends(leg, q[good], rules)
+        good[good] = leg.thigh_angle(q[good]) <= rules.flexion
+        good[good] = leg.is_regular(q[good])
+        ok[left] = good
     reached: Bools = ok.reshape(contact.shape[:-1])
     return reached
+
+
+def _on_its_side(leg: Leg, axis: int, places: Array, trunk: Box, rules: ReachRules) -> Bools:
+    """Which coordinates (M,) along an axis are below the trunk, or in the quadrant of a leg."""
+    if axis == 2:
+        below: Bools = places < trunk.center[2] - trunk.half_size[2]  # level ground any higher is in the trunk
+        return below
+    if abs(leg.hip[axis]) <= rules.side:  # a leg in the middle has no side
+        return np.ones(len(places), bool)
+    outward: Bools = places * np.sign(leg.hip[axis]) > rules.side
+    return outward
 
 
 def _bends(leg: Leg, q: Array, rules: ReachRules) -> Bools:
@@ -95,6 +109,28 @@ def _holds(bounds: tuple[int, int, int, int], hold: Cells | None) -> bool:
     return hold is None or bool(i0 <= hold[0][0] and hold[1][0] <= i1 and j0 <= hold[0][1] and hold[1][1] <= j1)
 
 
+def _greatest_area(mask: Bools, least: tuple[int, int], hold: Cells | None) -> int:
+    """Area of the rectangle that `largest_rectangle` finds, for all rows and columns at once."""
+    rows, columns = np.arange(mask.shape[0]), mask.shape[1]
+    # True cells above and at each cell, by column and row; then the least of them over each run of `width` columns.
+    heights = (rows[:, None] - np.maximum.accumulate(np.where(mask, -1, rows[:, None]), axis=0)).T.astype(np.uint16)
+    needed = np.full(len(rows), least[0], np.uint16)
+    if hold is not None:
+        needed = np.maximum(needed, np.where(rows >= hold[1][0], rows - hold[0][0] + 1, len(rows) + 1)).astype(np.uint16)
+    lowest, best = heights, 0
+    for width in range(1, columns + 1):
+        if width > 1:
+            lowest = np.minimum(lowest[:-1], heights[width - 1 :])
+        if int(lowest.max()) * columns <= best:
+            break
+        if width < least[1]:
+            continue
+        runs = lowest if hold is None else lowest[max(0, int(hold[1][1]) - width + 1) : int(hold[0][1]) + 1]
+        highest = int(np.where(runs >= needed, runs, 0).max(initial=0))
+        best = max(best, highest * width)
+    return best
+
+
 def largest_cuboid(
     mask: Bools, least: tuple[int, int, int] = (1, 1, 1), hold: Cells | None = None
 ) -> tuple[Integers, Integers] | None:
@@ -102,36 +138,45 @@ def largest_cuboid(
 
     For each range of layers, it takes the largest rectangle in their intersection.
     """
-    best, bounds = 0, None
+    best, found = 0, None
     layers = mask.shape[2]
+    layer = np.ascontiguousarray(mask.transpose(2, 0, 1))
     for z0 in range(layers if hold is None else int(hold[0][2]) + 1):
         common = np.ones(mask.shape[:2], bool)
+        most = common.size  # no rectangle in `common` is larger
         for z1 in range(z0, layers):
-            common &= mask[:, :, z1]
-            if common.sum() * (layers - z0) <= best:
+            common &= layer[z1]
+            most = min(most, int(np.count_nonzero(common)))
+            if most * (layers - z0) <= best:
                 break
             thick = z1 - z0 + 1
-            if thick < least[2] or common.sum() * thick <= best or not (hold is None or hold[1][2] <= z1):
+            if thick < least[2] or most * thick <= best or not (hold is None or hold[1][2] <= z1):
                 continue
-            area, i0, i1, j0, j1 = largest_rectangle(common, least[:2], hold)
-            if area * thick > best:
-                best, bounds = area * thick, (np.array([i0, j0, z0]), np.array([i1, j1, z1]))
-    return bounds
+            most = _greatest_area(common, least[:2], hold)
+            if most * thick > best:
+                best, found = most * thick, (z0, z1)
+    if found is None:
+        return None
+    z0, z1 = found
+    _, i0, i1, j0, j1 = largest_rectangle(layer[z0 : z1 + 1].all(0), least[:2], hold)
+    return np.array([i0, j0, z0]), np.array([i1, j1, z1])
 
 
 def reach_box(
     leg: Leg, radius: float, trunk: Box, rules: ReachRules, least: Array, resolution: float, hold: Box | None = None
 ) -> Box | None:
-    """The largest box of contact points of `leg`, base frame, with edges of at least `least` (3,) m, and with `hold` in it, if there is one.
+    """The largest box of contact points of `leg`, base frame, with edges of at least those of the first of `least` (N, 3) m for which there is one,
+    and with `hold` in it.
 
     The grid points at both ends of the box are reached, so its edges are the distances between them.
     """
     reach = leg.span + radius
     axes = [np.arange(np.floor((h - reach) / resolution), (h + reach) / resolution) * resolution for h in leg.hip]
+    axes = [places[_on_its_side(leg, axis, places, trunk, rules)] for axis, places in enumerate(axes)]
     axes[2] = axes[2][axes[2] < leg.hip[2]]
     cells = np.ceil(least / resolution - 1e-9).astype(int) + 1  # rounding must not add a cell
     if isinstance(leg, PlanarLeg) and not leg.abducts:
-        cells[1] = 2
+        cells[:, 1] = 2
         axes[1] = leg.hip[1] + leg.lateral + np.array([-rules.play, rules.play])
     mask = reached(leg, np.stack(np.meshgrid(*axes, indexing="ij"), -1), radius, trunk, rules)
     held = None
@@ -143,7 +188,7 @@ def reach_box(
         )
         if (held[0] < 0).any() or (held[1] >= mask.shape).any():
             return None
-    bounds = largest_cuboid(mask, (int(cells[0]), int(cells[1]), int(cells[2])), held)
+    bounds = next((found for x, y, z in cells.tolist() if (found := largest_cuboid(mask, (x, y, z), held)) is not None), None)
     if bounds is None:
         return None
     low, high = (np.array([axis[k] for axis, k in zip(axes, index, strict=True)]) for index in bounds)

@@ -243,9 +243,7 @@ def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: f
         for other, box in zip(all_legs, list(boxes), strict=False):
             mirror = np.append(np.sign(leg.hip[:2] * other.hip[:2]), 1.0)
             mirrored = Box(box.center * mirror, box.half_size)
-            samples = MIRROR_SAMPLES // 4 if is_redundant(leg) else MIRROR_SAMPLES
-            points = mirrored.center + np.random.default_rng(0).uniform(-1, 1, (samples, 3)) * box.half_size
-            if reached(leg, points, radius, trunk, rules).mean() >= MIRROR_FRACTION:
+            if _reaches(leg, mirrored, radius, trunk, rules):
                 boxes.append(mirrored)
                 break
         else:
@@ -257,16 +255,25 @@ def reach_set(name: str, all_legs: list[Leg], radius: float, trunk: Box, size: f
     return ReachSet(tuple(boxes), rules, size)
 
 
+def _reaches(leg: Leg, box: Box, radius: float, trunk: Box, rules: ReachRules) -> bool:
+    """Whether a leg reaches a box; it stops at the samples that say no."""
+    samples = MIRROR_SAMPLES // 4 if is_redundant(leg) else MIRROR_SAMPLES
+    points = box.center + np.random.default_rng(0).uniform(-1, 1, (samples, 3)) * box.half_size
+    missed = 0
+    for some in np.split(points, [samples // 20, samples // 4]):
+        missed += int(np.count_nonzero(~reached(leg, some, radius, trunk, rules)))
+        if (samples - missed) / samples < MIRROR_FRACTION:
+            return False
+    return True
+
+
 def _largest_box(leg: Leg, radius: float, trunk: Box, rules: ReachRules, size: float, hold: Box | None = None) -> Box | None:
     """The largest box, with `hold` in it, with edges of at least `LEAST_BOX`, or, where the leg reaches none, of as much of it as it does."""
     resolution = RESOLUTION * size
     if isinstance(leg, SerialLeg):
         resolution = max(resolution, leg.span / (REDUNDANT_CELLS if is_redundant(leg) else SERIAL_CELLS))
-    for fraction in LEAST_FRACTIONS:
-        box = reach_box(leg, radius, trunk, rules, fraction * size * LEAST_BOX, resolution, hold)
-        if box is not None:
-            return box
-    return None
+    least = np.array([fraction * size * LEAST_BOX for fraction in LEAST_FRACTIONS])
+    return reach_box(leg, radius, trunk, rules, least, resolution, hold)
 
 
 def _row(values: Array, digits: int = 3) -> str:

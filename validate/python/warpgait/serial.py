@@ -20,13 +20,19 @@ REGULAR = 0.15  # least singular value of ∂foot/∂q in a regular posture, in 
 _STEPS, _LARGEST_TURN, _CONVERGED, _POLISHING = 60, 0.6, 1e-6, 4  # of the minimization; rad; rad; steps without the weight
 _NEAR, _HALVINGS = 0.03, 8  # rad, of the last step with a larger weight; of a step that does not lead downhill
 _UPRIGHT = 0.8  # z of the first axis from which on a leg turns about the vertical, as an insect's does
+_PARALLEL, _ACROSS, _HARDLY = 1e-4, 0.1, 1e-2  # sines of the angle between two axes; rad outside the limits
 _THIGH = 0.2  # in lengths of the leg: the thigh is the first link below the first joint that is longer
+
+
+def _crossing(axis: Array) -> Array:
+    """The matrix (3, 3) of the product axis × ·."""
+    x, y, z = axis
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 def turns(axis: Array, angles: Array) -> Array:
     """The rotations (M, 3, 3) about a unit vector by angles (M,)."""
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    K = _crossing(axis)
     s, c = np.sin(angles)[:, None, None], 1 - np.cos(angles)[:, None, None]
     R: Array = np.eye(3) + s * K + c * (K @ K)
     return R
@@ -109,6 +115,20 @@ class SerialLeg:
             R, before = R @ turns(self.axes[j], q[:, j]), self.anchors[j]
         return at + R @ (self.foot - before), points, axes
 
+    def _moves(self, q: Array) -> tuple[Array, Array]:
+        """Foot centers (3, M), and their derivatives (J, 3, M) with respect to the joint angles, for joint angles (J, M)."""
+        vectors = np.empty((len(q) + 1, 3, q.shape[1]))  # from the joint at hand to the foot, then the derivatives, from the last on
+        vectors[0] = (self.foot - self.anchors[-1])[:, None]
+        before = np.array([np.zeros(3), *self.anchors[:-1]])
+        for j in reversed(range(len(q))):
+            last = len(q) - j
+            K, moved = _crossing(self.axes[j]), vectors[:last]
+            once = K @ moved
+            moved += np.sin(q[j]) * once + (1 - np.cos(q[j])) * (K @ once)
+            vectors[last] = K @ vectors[0]
+            vectors[0] += (self.anchors[j] - before[j])[:, None]
+        return vectors[0], vectors[:0:-1]
+
     def inverse(self, foot: Array) -> tuple[Array, Bools]:
         """Joint angles (..., J) for foot centers (..., 3) in the base frame, and whether the leg reaches them.
 
@@ -122,11 +142,52 @@ class SerialLeg:
             for more in LARGER:
                 self._descend(q, targets, within, more, _NEAR)
         self._descend(q, targets, within, 1.0, _CONVERGED)
-        reached: Bools = np.linalg.norm(self.place(q)[0] - targets, axis=1) < REACHED * self.length
+        reached: Bools = np.linalg.norm(self._moves(q.T)[0].T - targets, axis=1) < REACHED * self.length
+        within = np.flatnonzero(reached)
         for _ in range(_POLISHING):  # what the stance's weight has left
-            within = np.flatnonzero(reached)
-            q[within] += self._gauss_newton(q[within], targets[within], 1e-6 * self.weights, q[within])
+            step = self._gauss_newton(q[within], targets[within], 1e-6 * self.weights, q[within])
+            q[within] += step
+            within = within[np.abs(step).max(1) > _CONVERGED]
         return q.reshape(*foot.shape[:-1], -1), reached.reshape(foot.shape[:-1])
+
+    def may_reach(self, foot: Array) -> Bools:
+        """Whether a regular posture within the limits can have the foot's center at a point, for points (M, 3): false if none has.
+
+        There is a closed form for three joints of which the last two are parallel; for other legs, only the distance counts.
+        """
+        v = foot - self.hip
+        near: Bools = np.linalg.norm(v, axis=1) <= self.span
+        first, second, last = self.axes[0], self.axes[1], self.axes[-1]
+        parallel = np.linalg.norm(np.cross(second, last)) < _PARALLEL and np.linalg.norm(np.cross(first, second)) > _ACROSS
+        if self.is_redundant or not parallel:
+            return near
+        # The first joint brings the foot into the plane across the other two, on one side or the other of its axis.
+        along, turned = v @ first, np.cross(first, v)
+        a, b = (v - along[:, None] * first) @ second, turned @ second
+        cosine = ((self.foot - self.hip) @ second - along * (first @ second)) / np.maximum(np.hypot(a, b), 1e-12)
+        near &= np.abs(cosine) <= 1
+        plane = plane_across(second)[::-1]
+        thigh, shank = (complex(*(plane @ line)) for line in (self.anchors[2] - self.anchors[1], self.foot - self.anchors[2]))
+        possible = np.zeros(len(foot), bool)
+        for side in (-1.0, 1.0):
+            hip = side * np.arccos(np.clip(cosine, -1, 1)) - np.arctan2(b, a)
+            c, s = np.cos(hip)[:, None], np.sin(hip)[:, None]
+            at = v * c - turned * s + along[:, None] * first * (1 - c) - (self.anchors[1] - self.hip)
+            x, y = plane @ at.T
+            bend = (x * x + y * y - abs(thigh) ** 2 - abs(shank) ** 2) / (2 * abs(thigh) * abs(shank))
+            for sense in (-1.0, 1.0):
+                knee = sense * np.arccos(np.clip(bend, -1, 1))
+                lift = np.angle((x + 1j * y) / (thigh + shank * np.exp(1j * (knee + np.angle(thigh / shank)))))
+                angles = np.stack([hip, lift, np.sign(second @ last) * (knee - np.angle(shank / thigh))], -1)
+                possible |= (np.abs(bend) <= 1) & self._near_limits(angles)
+        return near & possible
+
+    def _near_limits(self, q: Array) -> Bools:
+        """Whether joint angles (M, J), or these and whole turns, are hardly outside the limits."""
+        middle = (self.lower + self.upper) / 2
+        off = np.abs((q - middle + np.pi) % (2 * np.pi) - np.pi)
+        ok: Bools = (off <= (self.upper - self.lower) / 2 + _HARDLY).all(1)
+        return ok
 
     def _descend(self, q: Array, targets: Array, active: Integers, more: float, last: float) -> None:
         """Moves the postures `active` among q (M, J) downhill, with the weights times `more`, each until a step is smaller than `last`, rad."""
@@ -143,10 +204,11 @@ class SerialLeg:
 
     def _gauss_newton(self, q: Array, targets: Array, weights: Array, stance: Array) -> Array:
         """A step (M, J) toward the least distance from the targets (M, 3), and from `stance` by `weights` (J,)."""
-        at, points, axes = self.place(q)
-        J = np.cross(axes, at[:, None] - points)  # (M, joint, 3)
-        gradient = np.einsum("mji,mi->mj", J, targets - at) - weights * (q - stance)
-        return _shortened(np.linalg.solve(J @ J.transpose(0, 2, 1) + np.diag(weights), gradient[..., None])[..., 0])
+        at, J = self._moves(q.T)
+        off = targets.T - at
+        gradient = [(column * off).sum(0) for column in J] - weights[:, None] * (q - stance).T
+        normal = [[(J[j] * J[k]).sum(0) + (weights[j] if j == k else 0.0) for k in range(j + 1)] for j in range(len(J))]
+        return _shortened(_solved(normal, gradient).T)
 
     def _newton(self, q: Array, targets: Array, weights: Array) -> Array:
         """The same with the curvature of the foot's place, which the choice among postures depends on; shortened until it leads downhill."""
@@ -198,15 +260,37 @@ class SerialLeg:
 
     def is_regular(self, q: Array) -> Bools:
         """Whether the leg can move its foot in all directions, for joint angles (M, J): not near the first axis, not stretched."""
-        at, points, axes = self.place(q)
-        least = np.linalg.svd(np.cross(axes, at[:, None] - points), compute_uv=False)[:, -1]
-        regular: Bools = least >= REGULAR * self.length
+        _, J = self._moves(q.T)
+        # The least singular value is larger than t if all leading minors of J Jᵀ − t² are positive.
+        square = [[(J[:, i] * J[:, k]).sum(0) for k in range(3)] for i in range(3)]
+        (a, d, e), (_, b, f), (_, _, c) = square
+        a, b, c = (value - (REGULAR * self.length) ** 2 for value in (a, b, c))
+        minor = a * b - d * d
+        regular: Bools = (a > 0) & (minor > 0) & (c * minor > a * f * f - 2 * d * e * f + b * e * e)
         return regular
 
     def within_limits(self, q: Array) -> Bools:
         """Whether joint angles (..., J) are within the limits."""
         ok: Bools = np.all((q >= self.lower) & (q <= self.upper), axis=-1)
         return ok
+
+
+def _solved(A: list[list[Array]], b: list[Array]) -> Array:
+    """The solutions (J, M) of M systems of linear equations with right sides (J, M), whose symmetric, positive definite matrices are given by the
+    rows of their lower triangles, of numbers (M,). By Cholesky's method, A = L D Lᵀ."""
+    L: list[list[Array]] = []
+    D: list[Array] = []
+    x: list[Array] = []
+    for row, right in zip(A, b, strict=True):
+        scaled: list[Array] = []  # L[j, k] D[k]
+        for k in range(len(L)):
+            scaled.append(row[k] - sum(scaled[i] * L[k][i] for i in range(k)))
+        L.append([value / pivot for value, pivot in zip(scaled, D, strict=True)])
+        D.append(row[-1] - sum(value * factor for value, factor in zip(scaled, L[-1], strict=True)))
+        x.append(right - sum(factor * value for factor, value in zip(L[-1], x, strict=True)))
+    for j in reversed(range(len(x))):
+        x[j] = x[j] / D[j] - sum(L[k][j] * x[k] for k in range(j + 1, len(x)))
+    return np.array(x)
 
 
 def _shortened(step: Array) -> Array:
