@@ -3,6 +3,7 @@
 import sysconfig
 import tomllib
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ from warpgait import InputError
 from warpgait.arrays import Array
 from warpgait.kinematics import PlanarLeg, legs
 from warpgait.model import available_models, find_model, foot_names, indices, load_spec, stand
-from warpgait.reach import largest_cuboid
+from warpgait.reach import Box, ReachRules, largest_cuboid, reach_box
 from warpgait.robots import derive, to_toml
+from warpgait.serial import SerialLeg
 
 NAMES = ("anymal_b", "anymal_c")
 URDF = {
@@ -210,6 +212,32 @@ def test_the_largest_cuboid_is_the_largest(
             assert (last - first + 1 >= least).all() and np.prod(last - first + 1) == best
             assert hold is None or ((first <= hold[0]).all() and (hold[1] <= last).all())
     assert largest_cuboid(np.zeros((2, 2, 2), bool)) is None
+
+
+@pytest.mark.parametrize("first", [(0, 0, 1), (0.6, 0, 0.8), (0, 0.6, 0.8)])
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("room", [0.0, 1.5])
+def test_the_closed_form_of_what_a_leg_may_reach_leaves_out_no_posture(first: tuple[float, ...], sense: int, room: float) -> None:
+    model = load_spec(find_model("hexapod")).compile()
+    random = np.random.default_rng(0)
+    for found in legs(model, foot_names(model))[:3]:
+        assert isinstance(found, SerialLeg)
+        axes = np.array([first, found.axes[1], sense * found.axes[2]])
+        leg = replace(found, axes=axes, lower=found.lower - room, upper=found.upper + room)
+        q = random.uniform(leg.lower, leg.upper, (5000, 3))
+        assert leg.may_reach(leg.place(q)[0])[leg.is_regular(q)].all()
+        around = leg.hip + leg.span * random.uniform(-1, 1, (5000, 3))
+        angles, reached = leg.inverse(around)
+        good, may = reached & leg.within_limits(angles) & leg.is_regular(angles), leg.may_reach(around)
+        assert not (good & ~may).any() and good.mean() < may.mean() < 0.6
+
+
+def test_a_leg_that_reaches_nothing_has_no_box() -> None:
+    model = load_spec(find_model("hexapod")).compile()
+    leg = replace(legs(model, foot_names(model))[0], lower=np.full(3, 3.0), upper=np.full(3, 3.1))
+    trunk = Box(np.zeros(3), np.array([0.1, 0.1, 0.02]))
+    rules = ReachRules(side=0.01)
+    assert reach_box(leg, 0.02, trunk, rules, np.array([[0.1, 0.1, 0.1], [0.04, 0.04, 0.04]]), 0.02) is None
 
 
 @pytest.mark.parametrize("name", available_models())

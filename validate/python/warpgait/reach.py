@@ -42,14 +42,14 @@ def reached(leg: Leg, contact: Array, radius: float, trunk: Box, rules: ReachRul
     """Whether contact points (..., 3), base frame, m, belong to the reach set of `leg`."""
     s, c = np.sin(rules.tilt), np.cos(rules.tilt)
     points = contact.reshape(-1, 3)
-    ok = np.linalg.norm(points - leg.hip, axis=1) <= leg.span + radius
+    ok: Bools = np.linalg.norm(points - leg.hip, axis=1) <= leg.span + radius
     for axis in range(3):
         ok &= _on_its_side(leg, axis, points[:, axis], trunk, rules)
     for normal in ([0, 0, 1], [s, 0, c], [-s, 0, c], [0, s, c], [0, -s, c]):
         left = np.flatnonzero(ok)
         center = points[left] + radius * np.asarray(normal, float)
         gap = np.abs(center - trunk.center) - trunk.half_size - radius - rules.clearance
-        clear = (gap > 0).any(-1)
+        clear: Bools = np.any(gap > 0, axis=-1)
         if isinstance(leg, SerialLeg):  # whose inverse kinematics takes long
             clear[clear] = leg.may_reach(center[clear])
         ok[left[~clear]] = False
@@ -158,7 +158,8 @@ def largest_cuboid(
     if found is None:
         return None
     z0, z1 = found
-    _, i0, i1, j0, j1 = largest_rectangle(layer[z0 : z1 + 1].all(0), least[:2], hold)
+    common = np.logical_and.reduce(layer[z0 : z1 + 1])
+    _, i0, i1, j0, j1 = largest_rectangle(common, least[:2], hold)
     return np.array([i0, j0, z0]), np.array([i1, j1, z1])
 
 

@@ -38,6 +38,13 @@ def turns(axis: Array, angles: Array) -> Array:
     return R
 
 
+def _turn(vectors: Array, axis: Array, angles: Array) -> None:
+    """Turns vectors (..., 3, M) about a unit vector by angles (M,)."""
+    K = _crossing(axis)
+    once = K @ vectors
+    vectors += np.sin(angles) * once + (1 - np.cos(angles)) * (K @ once)
+
+
 def thigh_of(anchors: Array, foot: Array) -> int:
     """The joint that moves the thigh of a leg with its joints at `anchors` (J, 3) and its foot at `foot` (3,)."""
     links = np.linalg.norm(np.diff(anchors[1:], axis=0), axis=1)
@@ -107,26 +114,42 @@ class SerialLeg:
 
     def place(self, q: Array) -> tuple[Array, Array, Array]:
         """Foot centers (M, 3), points on the axes (M, J, 3) and the axes (M, J, 3) for joint angles (M, J)."""
-        R, at, before = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3)), np.zeros(3)
-        points, axes = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
-        for j in range(q.shape[1]):
-            at = at + R @ (self.anchors[j] - before)
-            points[:, j], axes[:, j] = at, R @ self.axes[j]
-            R, before = R @ turns(self.axes[j], q[:, j]), self.anchors[j]
-        return at + R @ (self.foot - before), points, axes
+        joints = q.shape[1]
+        vectors = np.zeros((2 * joints + 1, 3, len(q)))  # the foot, then points and axes by turns, from the last joint on
+        vectors[0] = (self.foot - self.anchors[-1])[:, None]
+        for j in reversed(range(joints)):
+            last = 2 * (joints - j) - 1
+            _turn(vectors[:last], self.axes[j], q[:, j])
+            vectors[last + 1] = self.axes[j][:, None]
+            shift = self._link(j)[:, None]
+            vectors[0] += shift
+            vectors[1 : last + 1 : 2] += shift
+        return vectors[0].T, vectors[-2::-2].transpose(2, 0, 1), vectors[:0:-2].transpose(2, 0, 1)
+
+    def _link(self, j: int) -> Array:
+        """To joint `j` from the one before, or from the base's origin (3,)."""
+        line: Array = self.anchors[j] - (self.anchors[j - 1] if j else 0.0)
+        return line
+
+    def _foot(self, q: Array) -> Array:
+        """Foot centers (M, 3) for joint angles (M, J)."""
+        at = np.tile((self.foot - self.anchors[-1])[:, None], len(q))
+        for j in reversed(range(q.shape[1])):
+            _turn(at, self.axes[j], q[:, j])
+            at += self._link(j)[:, None]
+        return at.T
 
     def _moves(self, q: Array) -> tuple[Array, Array]:
         """Foot centers (3, M), and their derivatives (J, 3, M) with respect to the joint angles, for joint angles (J, M)."""
-        vectors = np.empty((len(q) + 1, 3, q.shape[1]))  # from the joint at hand to the foot, then the derivatives, from the last on
+        vectors = np.empty(
+            (len(q) + 1, 3, q.shape[1])
+        )  # from the joint at hand to the foot, then the derivatives, from the last on
         vectors[0] = (self.foot - self.anchors[-1])[:, None]
-        before = np.array([np.zeros(3), *self.anchors[:-1]])
         for j in reversed(range(len(q))):
             last = len(q) - j
-            K, moved = _crossing(self.axes[j]), vectors[:last]
-            once = K @ moved
-            moved += np.sin(q[j]) * once + (1 - np.cos(q[j])) * (K @ once)
-            vectors[last] = K @ vectors[0]
-            vectors[0] += (self.anchors[j] - before[j])[:, None]
+            _turn(vectors[:last], self.axes[j], q[j])
+            vectors[last] = _crossing(self.axes[j]) @ vectors[0]
+            vectors[0] += self._link(j)[:, None]
         return vectors[0], vectors[:0:-1]
 
     def inverse(self, foot: Array) -> tuple[Array, Bools]:
@@ -142,13 +165,13 @@ class SerialLeg:
             for more in LARGER:
                 self._descend(q, targets, within, more, _NEAR)
         self._descend(q, targets, within, 1.0, _CONVERGED)
-        reached: Bools = np.linalg.norm(self._moves(q.T)[0].T - targets, axis=1) < REACHED * self.length
+        reached: Bools = np.linalg.norm(self._foot(q) - targets, axis=1) < REACHED * self.length
         within = np.flatnonzero(reached)
         for _ in range(_POLISHING):  # what the stance's weight has left
             step = self._gauss_newton(q[within], targets[within], 1e-6 * self.weights, q[within])
             q[within] += step
             within = within[np.abs(step).max(1) > _CONVERGED]
-        return q.reshape(*foot.shape[:-1], -1), reached.reshape(foot.shape[:-1])
+        return q.reshape(*foot.shape[:-1], len(self.stance)), reached.reshape(foot.shape[:-1])
 
     def may_reach(self, foot: Array) -> Bools:
         """Whether a regular posture within the limits can have the foot's center at a point, for points (M, 3): false if none has.
@@ -168,7 +191,7 @@ class SerialLeg:
         near &= np.abs(cosine) <= 1
         plane = plane_across(second)[::-1]
         thigh, shank = (complex(*(plane @ line)) for line in (self.anchors[2] - self.anchors[1], self.foot - self.anchors[2]))
-        possible = np.zeros(len(foot), bool)
+        possible: Bools = np.zeros(len(foot), bool)
         for side in (-1.0, 1.0):
             hip = side * np.arccos(np.clip(cosine, -1, 1)) - np.arctan2(b, a)
             c, s = np.cos(hip)[:, None], np.sin(hip)[:, None]
@@ -180,13 +203,14 @@ class SerialLeg:
                 lift = np.angle((x + 1j * y) / (thigh + shank * np.exp(1j * (knee + np.angle(thigh / shank)))))
                 angles = np.stack([hip, lift, np.sign(second @ last) * (knee - np.angle(shank / thigh))], -1)
                 possible |= (np.abs(bend) <= 1) & self._near_limits(angles)
-        return near & possible
+        possible &= near
+        return possible
 
     def _near_limits(self, q: Array) -> Bools:
         """Whether joint angles (M, J), or these and whole turns, are hardly outside the limits."""
         middle = (self.lower + self.upper) / 2
         off = np.abs((q - middle + np.pi) % (2 * np.pi) - np.pi)
-        ok: Bools = (off <= (self.upper - self.lower) / 2 + _HARDLY).all(1)
+        ok: Bools = np.all(off <= (self.upper - self.lower) / 2 + _HARDLY, axis=1)
         return ok
 
     def _descend(self, q: Array, targets: Array, active: Integers, more: float, last: float) -> None:
@@ -227,7 +251,7 @@ class SerialLeg:
         left = np.arange(len(q))
         for _ in range(_HALVINGS):
             moved = q[left] + step[left]
-            higher = self._value(self.place(moved)[0], targets[left], moved, weights) > value[left] * (1 + 1e-12)
+            higher = self._value(self._foot(moved), targets[left], moved, weights) > value[left] * (1 + 1e-12)
             left = left[higher & (np.abs(step[left]).max(1) > _CONVERGED)]
             if not left.size:
                 break
