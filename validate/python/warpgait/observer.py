@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array, Bools
-from .model import Indices
+from .model import SAGITTAL, Indices
 
 WRENCH_TIME = 0.15  # s, time constant of the wrench on the trunk
 JOINT_TIME = 0.04  # s, time constant of the joint torques
@@ -50,14 +50,19 @@ class Observer:
         unexplained[self._index.qvel] -= moment.torque
         wrench, joints = self._period / WRENCH_TIME, self._period / JOINT_TIME
         base = unexplained[:6].copy()
+        across = []
         for e, rows in enumerate(self._index.qvel):
             if moment.standing[e] or standing[e]:
                 jacobian = moment.jacobians[e]
                 force = np.linalg.lstsq(jacobian[:, rows].T, unexplained[rows], rcond=1e-3)[0]
                 base -= jacobian[:, :6].T @ force
+                if len(rows) == SAGITTAL:
+                    across.append(jacobian[:, :6].T @ np.cross(*jacobian[:, rows].T))
                 self.generalized[rows] *= 1 - joints
             else:
                 self.generalized[rows] += joints * (unexplained[rows] - self.generalized[rows])
+        if across:
+            base -= _borne(np.transpose(across), base)
         self.generalized[:6] += wrench * (base - self.generalized[:6])
 
     def locate(self, rotation: Array, arm: Array) -> Array:
@@ -69,3 +74,15 @@ class Observer:
         target = np.cross(g, torque) / weight
         self.center += self._period / CENTER_TIME * (target - self.center)
         return self.center
+
+
+def _borne(across: Array, base: Array) -> Array:
+    """The part of the wrench `base` (6,) on the trunk that standing feet exert by forces across the planes of their legs, in which no joint has
+    a part. `across` (6, n) has the wrench of each such force.
+
+    They are the least that bear the sideways force and the torque about the vertical axis. What is left of the torque about the axis ahead is
+    then that of a center of mass that is elsewhere.
+    """
+    held = [0, 1, 2, 5]
+    result: Array = across @ np.linalg.lstsq(across[held], base[held], rcond=1e-3)[0]
+    return result
