@@ -289,12 +289,12 @@ fn blocks_of_known_legs_match_differences_on_all_terrains() {
     }
 }
 
-/// Legs of two joints: no torque of the abduction that they lack, and thin reach boxes.
+/// Legs of two joints: no torque of the abduction that they lack, thin reach boxes for the centers of feet, and the base on its rails.
 #[test]
 fn blocks_of_legs_of_two_joints_match_differences() {
     for formulation in ["warped", "direct", "hybrid"] {
         let problem = problem_of("solo8", TERRAINS[4].1, formulation, "");
-        for name in ["joint speed", "joint torque"] {
+        for name in ["joint speed", "joint torque", "rails"] {
             let has = |(block, _): (&dyn Constraint, usize)| block.name() == name && block.rows() > 0;
             assert!(problem.blocks().any(has), "{name}");
         }

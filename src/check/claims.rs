@@ -50,6 +50,7 @@ pub(super) fn asked_robot(plan: &Plan, scenario: &Scenario) -> Result<MetaRobot>
         } else {
             MetaRobot::legs_of(&robot, scenario)
         },
+        sagittal: robot.sagittal_radii(),
         nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
     })
 }

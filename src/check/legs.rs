@@ -340,32 +340,32 @@ fn trunk(robot: &MetaRobot, legs: &[Leg], angles: &mut [Vec<f64>]) -> Option<Pla
     Some(Placed { inertia, ..trunk })
 }
 
-/// The centers of the feet: along the normal in stance; in swing, along a direction that turns smoothly from one normal to the next. (N·E,)
+/// The centers of the feet. (N·E,)
 fn centers(plan: &Plan, legs: &[Leg]) -> Vec<[f64; 3]> {
-    let (feet, samples) = (legs.len(), plan.t.len());
-    let mut centers = plan.foot_position.clone();
-    for (e, leg) in legs.iter().enumerate() {
-        let standing = |n: usize| plan.foot_contact[n * feet + e];
-        let normal = |n: usize| plan.foot_normal[n * feet + e];
-        for n in 0..samples {
-            let mut direction = normal(n);
-            if !standing(n) {
-                let before = (0..n).rev().find(|&n| standing(n));
-                let after = (n..samples).find(|&n| standing(n));
-                if let (Some(before), Some(after)) = (before, after) {
-                    let [lift_off, touch_down] =
-                        plan.swing_at(e, plan.t[n]).unwrap_or([plan.t[before], plan.t[after]]);
-                    let u = (plan.t[n] - lift_off) / (touch_down - lift_off);
-                    let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
-                    let between = add(scale(1.0 - s, normal(before)), scale(s, normal(after)));
-                    direction = scale(1.0 / norm(between), between);
-                }
-            }
-            let center = &mut centers[n * feet + e];
-            *center = add(*center, scale(leg.radius, direction));
-        }
+    let center = |(place, at): (&[f64; 3], usize)| {
+        let (n, e) = (at / legs.len(), at % legs.len());
+        add(*place, scale(legs[e].radius, center_direction(plan, n, e)))
+    };
+    plan.foot_position.iter().zip(0..).map(center).collect()
+}
+
+/// From the contact point of foot `e` at sample `n` to its center: along the normal in stance; in swing, along a direction that turns smoothly
+/// from one normal to the next.
+pub(super) fn center_direction(plan: &Plan, n: usize, e: usize) -> [f64; 3] {
+    let (feet, samples) = (plan.foot_names.len(), plan.t.len());
+    let standing = |n: usize| plan.foot_contact[n * feet + e];
+    let normal = |n: usize| plan.foot_normal[n * feet + e];
+    if standing(n) {
+        return normal(n);
     }
-    centers
+    let before = (0..n).rev().find(|&n| standing(n));
+    let after = (n..samples).find(|&n| standing(n));
+    let (Some(before), Some(after)) = (before, after) else { return normal(n) };
+    let [lift_off, touch_down] = plan.swing_at(e, plan.t[n]).unwrap_or([plan.t[before], plan.t[after]]);
+    let u = (plan.t[n] - lift_off) / (touch_down - lift_off);
+    let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    let between = add(scale(1.0 - s, normal(before)), scale(s, normal(after)));
+    scale(1.0 / norm(between), between)
 }
 
 /// The rotation matrix of a unit quaternion.

@@ -1,6 +1,7 @@
 //! The base: reach, clearance, and whether anything jumps.
 
 use super::laws;
+use super::legs::center_direction;
 use super::subject::{Finding, Residuals, Subject, Worst, larger, rms};
 use super::vector::{add, norm, rotate, rotate_back, scale, sub};
 
@@ -11,13 +12,17 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut
     smoothness(s, findings);
 }
 
-/// Eq. 4: distance of Rᵀ(pᵢ − p) + s from the box 𝓡ᵢ.
+/// Eq. 4: distance of Rᵀ(pᵢ − p) + s from the box 𝓡ᵢ. Of a foot that moves in a plane of the base, the center does: y is the center's.
 fn reach(s: &Subject, findings: &mut Vec<Finding>, residuals: &mut Residuals) {
     let mut worst = Worst::default();
     residuals.reach = vec![0.0; s.samples];
     for (n, e) in s.sample_feet() {
         let relative = sub(s.foot_position(n, e), s.plan.base_position[n]);
-        let body = rotate_back(s.plan.base_quaternion_wxyz[n], relative);
+        let turn = s.plan.base_quaternion_wxyz[n];
+        let mut body = rotate_back(turn, relative);
+        if let Some(Some(radius)) = s.robot.sagittal.get(e) {
+            body[1] += radius * rotate_back(turn, center_direction(s.plan, n, e))[1];
+        }
         let limits = &s.robot.reach[e];
         let center = s.on_trunk(n, limits.center);
         let beyond = std::array::from_fn(|k| larger((body[k] - center[k]).abs() - limits.half_size[k], 0.0));

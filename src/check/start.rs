@@ -173,7 +173,11 @@ impl Start<'_> {
 
     fn within_reach(&self, e: usize, foot: [f64; 3]) -> Result<()> {
         let limits = &self.robot.reach[e];
-        let body = apply(&transposed(&self.turn), sub(foot, self.place));
+        let back = transposed(&self.turn);
+        let mut body = apply(&back, sub(foot, self.place));
+        if let Some(Some(radius)) = self.robot.sagittal.get(e).filter(|_| self.stands(e)) {
+            body[1] += radius * apply(&back, self.ground.normal(foot[0], foot[1]))[1];
+        }
         let beyond =
             std::array::from_fn(|k| ((body[k] - limits.center[k]).abs() - limits.half_size[k]).max(0.0));
         let distance = 1e3 * norm(beyond);

@@ -25,6 +25,7 @@ pub mod margins;
 pub mod newton_euler;
 pub mod normal_force;
 pub mod posture;
+pub mod rails;
 pub mod reach;
 pub mod stance;
 pub mod swing;

@@ -104,6 +104,8 @@ pub struct Model {
     pub legs: Vec<Option<Leg>>,
     /// Trunk and links, where the legs have mass in this plan.
     pub body: Option<Body>,
+    /// By foot, its radius, m, if it moves in a plane of the base, as those of legs of two joints do; empty where none does.
+    pub sagittal: Vec<Option<f64>>,
     /// What their mass adds.
     pub leg_terms: LegTerms,
     /// By foot.
@@ -166,6 +168,7 @@ impl Model {
             reach: robot.feet.iter().map(|f| f.reach).collect(),
             tighter: Tighter::default(),
             legs: robot.feet.iter().map(Foot::leg).collect(),
+            sagittal: robot.sagittal_radii(),
             body,
             leg_terms: LegTerms::default(),
             adhesive: foot_names.iter().map(|name| adhesive_feet.contains(name)).collect(),

@@ -250,6 +250,9 @@ pub struct MetaRobot {
     /// The legs by foot, with the masses of their links; empty where the plan has massless legs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegSpec>,
+    /// By foot, its radius, m, if it moves in a plane of the base, as those of legs of two joints do; empty where none does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sagittal: Vec<Option<f64>>,
     /// The nominal places of the feet, base frame, m; empty in plans of version 0.1.0 and before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nominal: Vec<[f64; 3]>,

@@ -224,6 +224,7 @@ impl MetaRobot {
             torso: robot.torso,
             foot_radius: robot.foot_radius(),
             legs: Self::legs_of(robot, &loaded.scenario),
+            sagittal: robot.sagittal_radii(),
             nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
         }
     }

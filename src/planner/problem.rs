@@ -18,6 +18,7 @@ use crate::constraints::knee_clearance::KneeClearance;
 use crate::constraints::newton_euler::NewtonEuler;
 use crate::constraints::normal_force::NormalForce;
 use crate::constraints::posture::posture;
+use crate::constraints::rails::Rails;
 use crate::constraints::reach::Reach;
 use crate::constraints::stance::OnGround;
 use crate::constraints::swing::SwingClearance;
@@ -152,6 +153,9 @@ impl GaitProblem {
             blocks.push(Box::new(JointSpeed::new(&model)));
             blocks.push(Box::new(JointTorque::new(&model)));
             blocks.push(Box::new(KneeClearance::new(&model)));
+        }
+        if !model.sagittal.is_empty() {
+            blocks.push(Box::new(Rails::new(&model)));
         }
         if model.layout.has_switches() {
             blocks.push(Box::new(Durations::new(&model, scenario.gait.duration_bounds)));

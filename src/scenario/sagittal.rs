@@ -7,13 +7,22 @@ use super::format::Scenario;
 use super::wrapped;
 use crate::Result;
 use crate::input::Document;
-use crate::robot::Robot;
+use crate::robot::{Foot, Robot};
 
 /// How far a place may be beside the line, m, and a heading off, rad.
 const BESIDE: f64 = 1e-3;
 const TURNED: f64 = 1e-3;
 /// How fast the base may move to the side at the end, m/s.
 const ASIDE: f64 = 1e-3;
+
+impl Robot {
+    /// By foot, its radius, m, if it moves in a plane of the base; empty where none does.
+    pub fn sagittal_radii(&self) -> Vec<Option<f64>> {
+        let radius =
+            |foot: &Foot| foot.leg.as_ref().filter(|leg| leg.is_sagittal()).map(|leg| leg.foot_radius);
+        if self.is_sagittal() { self.feet.iter().map(radius).collect() } else { Vec::new() }
+    }
+}
 
 /// Refuses a goal, a way-point, a heading or a velocity off the straight line.
 pub(super) fn check(document: &Document, scenario: &Scenario, robot: &Robot) -> Result<()> {

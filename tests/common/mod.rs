@@ -140,6 +140,7 @@ pub fn standing() -> Plan {
                 reach: robot.feet.iter().map(|foot| foot.reach).collect(),
                 torso: robot.torso,
                 foot_radius: robot.foot_radius(),
+                sagittal: robot.sagittal_radii(),
                 legs: Vec::new(),
                 nominal: robot.feet.iter().map(|foot| foot.nominal).collect(),
             },
