@@ -49,7 +49,7 @@ pub(super) enum Kinematics {
 #[derive(Clone, Debug)]
 pub enum LegPosture<'a, T> {
     /// Of a leg with a closed form.
-    Planar(PlanarPosture<T>),
+    Planar(PlanarPosture<'a, T>),
     /// Of any other leg.
     Serial(SerialPosture<'a, T>),
 }
@@ -77,6 +77,14 @@ impl Leg {
         }
     }
 
+    /// The closed form of a leg whose first joint is an abduction about the base's x axis.
+    pub(super) fn abducting(&self) -> Option<&Planar> {
+        match &self.kinematics {
+            Kinematics::Planar(leg) => Some(leg).filter(|leg| leg.frame.is_none()),
+            Kinematics::Serial(_) => None,
+        }
+    }
+
     /// Whether there are joint angles for the contact point r, regardless of joint limits.
     pub fn reaches(&self, r: [f64; 3]) -> bool {
         match &self.kinematics {
@@ -98,12 +106,9 @@ impl Leg {
         self.speed_limit.len()
     }
 
-    /// The joints that move fast in a swing. The abduction of a leg with a closed form is slow.
+    /// The joints that move fast in a swing: all but an abduction about the base's x axis.
     pub fn swing_joints(&self) -> Range<usize> {
-        match &self.kinematics {
-            Kinematics::Planar(_) => 1..self.joints(),
-            Kinematics::Serial(_) => 0..self.joints(),
-        }
+        usize::from(self.abducting().is_some())..self.joints()
     }
 }
 
@@ -120,7 +125,8 @@ impl<T: Scalar> LegPosture<'_, T> {
     /// An angle for each of [`Leg::swing_joints`], rad: that of the joint, up to a constant and its sign.
     pub fn swing_angles(&self) -> ByJoint<T> {
         match self {
-            Self::Planar(posture) => posture.swing_angles().into_iter().collect(),
+            Self::Planar(posture) if posture.abducts() => posture.swing_angles().into_iter().collect(),
+            Self::Planar(posture) => posture.joint_angles().into_iter().collect(),
             Self::Serial(posture) => posture.joint_angles(),
         }
     }

@@ -1,5 +1,5 @@
-//! Closed-form inverse kinematics of a leg with hip abduction (HAA, about x), hip flexion (HFE) and knee flexion (KFE, both about y when
-//! not abducted).
+//! Closed-form inverse kinematics of a leg with hip abduction (HAA), hip flexion (HFE) and knee flexion (KFE), the latter two about parallel
+//! axes across that of the former. With HAA about x and the others about y when not abducted, as most four-legged robots have them:
 //!
 //! ```text
 //!   d = r − hip + (0, 0, foot_radius)         center of the foot from the hip, base frame
@@ -12,11 +12,14 @@
 //! r the contact point. The center of the foot is assumed one radius above r along the base's z axis. It is really along the normal of the
 //! ground; the error is the radius times the angle between the two.
 //!
+//! Legs with other axes, such as those of insects (HAA about z), have the same form in axes of their own: x along HAA, y along HFE, both at zero
+//! joint angles, and z such that the leg hangs down.
+//!
 //! Out of reach, square roots are rounded off so that all functions stay smooth: an iterate may be anywhere.
 
 use std::f64::consts::TAU;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::chain::Chain;
 use super::jet::Scalar;
@@ -25,12 +28,14 @@ use super::jet::Scalar;
 const SINE_ROUNDING: f64 = 5e-3;
 /// Rounding of h², in squared lengths of the leg: it matters only where the foot is within a few centimeters of the HAA axis.
 const DROP_ROUNDING: f64 = 2.7e-4;
-/// How far the axes of a chain may be from x, y and y, rad, and how far a length may be off, m, for the closed form to hold.
+/// How far the axes of a chain may be from x, y and y of the leg, rad, for the closed form to hold.
 const STRAIGHT: f64 = 1e-6;
 
-/// Geometry of a leg whose inverse kinematics has a closed form. Lengths in m, base frame, origin at the center of mass.
+/// Geometry of a leg whose inverse kinematics has a closed form. Lengths in m, in the leg's axes, origin at the center of mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Planar {
+    /// The leg's axes in the base frame, in rows; none where they are the base's.
+    pub frame: Option<Matrix3<f64>>,
     /// x of the HFE axis, y and z of the HAA axis.
     pub hip: [f64; 3],
     /// e: the HFE axis above the HAA axis at zero angles.
@@ -43,8 +48,8 @@ pub struct Planar {
     pub shank: f64,
     /// +1 if the shank points further forward than the thigh, −1 if it points further back.
     pub bend: f64,
-    /// Of the foot.
-    pub foot_radius: f64,
+    /// From the contact point to the center of the foot.
+    pub lift: [f64; 3],
     /// How the joints of the model count their angles.
     pub counting: Counting,
 }
@@ -67,9 +72,9 @@ impl Default for Counting {
     }
 }
 
-/// The joint angles of a leg and the places of its parts, base frame.
+/// The joint angles of a leg and the places of its parts, in the leg's axes.
 #[derive(Clone, Copy, Debug)]
-pub struct PlanarPosture<T> {
+pub struct PlanarPosture<'a, T> {
     /// sin and cos of the angle of abduction.
     abduction: [T; 2],
     /// The center of the foot in the plane of the leg from the HFE axis: forward, down.
@@ -80,7 +85,7 @@ pub struct PlanarPosture<T> {
     thigh: [T; 2],
     /// sin κ, cos κ.
     bent: [T; 2],
-    leg: Planar,
+    leg: &'a Planar,
 }
 
 /// A smooth positive substitute for √u, where u may be negative.
@@ -89,48 +94,68 @@ fn rounded_root<T: Scalar>(u: T, rounding: f64) -> T {
 }
 
 impl Planar {
-    /// The closed form of a chain with the axes x, y, y or their opposites at zero angles, whose knee bends as at the joint angles
-    /// `stance`; none for other chains.
+    /// The closed form of a chain of three joints whose knee bends as at the joint angles `stance`; none if the axis of the first is not across
+    /// those of the other two, which are parallel.
     pub fn of_chain(chain: &Chain, stance: &[f64], foot_radius: f64) -> Option<Self> {
-        let ([haa, hfe, kfe], &[_, _, stance]) = (&chain.joints[..], stance) else { return None };
-        let sign = [haa.axis.x, hfe.axis.y, kfe.axis.y].map(f64::signum);
-        let axes = [Vector3::x(), Vector3::y(), Vector3::y()];
-        let aligned = chain.joints.iter().zip(axes).zip(sign);
-        if aligned.into_iter().any(|((joint, axis), sign)| (joint.axis - axis * sign).norm() > STRAIGHT) {
+        let [first, second, third] = &chain.joints[..] else { return None };
+        let frame = axes(chain, stance);
+        let turned = |v: Vector3<f64>| frame.map_or(v, |frame| frame * v);
+        let sign = [turned(first.axis).x, turned(second.axis).y, turned(third.axis).y].map(f64::signum);
+        let expected = [Vector3::x(), Vector3::y(), Vector3::y()];
+        let aligned = chain.joints.iter().zip(expected).zip(sign);
+        if aligned
+            .into_iter()
+            .any(|((joint, axis), sign)| (turned(joint.axis) - axis * sign).norm() > STRAIGHT)
+        {
             return None;
         }
-        let (thigh, shank) = (kfe.position, chain.foot);
+        let (haa, hfe) = (turned(first.position), turned(second.position));
+        let (thigh, shank) = (turned(third.position), turned(chain.foot));
         let from_down = |v: Vector3<f64>| v.x.atan2(-v.z);
         let turn = wrapped(from_down(shank) - from_down(thigh), 0.0);
-        let bent = wrapped(turn - sign[2] * stance, 0.0);
-        let middle = [haa, hfe, kfe].map(|joint| 0.5 * (joint.range[0] + joint.range[1]));
+        let bent = wrapped(turn - sign[2] * stance[2], 0.0);
+        let middle = [first, second, third].map(|joint| 0.5 * (joint.range[0] + joint.range[1]));
         Some(Self {
-            hip: [haa.position.x + hfe.position.x, haa.position.y, haa.position.z],
-            rise: hfe.position.z,
-            lateral: hfe.position.y + thigh.y + shank.y,
+            frame,
+            hip: [haa.x + hfe.x, haa.y, haa.z],
+            rise: hfe.z,
+            lateral: hfe.y + thigh.y + shank.y,
             thigh: thigh.x.hypot(thigh.z),
             shank: shank.x.hypot(shank.z),
             bend: if bent < 0.0 { -1.0 } else { 1.0 },
-            foot_radius,
+            lift: turned(Vector3::z() * foot_radius).into(),
             counting: Counting { sign, zero: [from_down(thigh), turn], middle },
         })
     }
 
+    /// A vector of the base frame in the leg's axes.
+    fn in_leg<T: Scalar>(&self, v: [T; 3]) -> [T; 3] {
+        self.frame.map_or(v, |frame| rotated(&frame, v))
+    }
+
+    /// A vector in the leg's axes in the base frame.
+    fn in_base<T: Scalar>(&self, v: [T; 3]) -> [T; 3] {
+        self.frame.map_or(v, |frame| rotated(&frame.transpose(), v))
+    }
+
+    /// The center of the foot from the hip in the leg's axes, for the contact point r in the base frame.
+    fn foot_from_hip<T: Scalar>(&self, r: [T; 3]) -> [T; 3] {
+        let r = self.in_leg(r);
+        std::array::from_fn(|c| r[c] + (self.lift[c] - self.hip[c]))
+    }
+
     /// Whether there are joint angles for the contact point r, regardless of joint limits.
     pub fn reaches(&self, r: [f64; 3]) -> bool {
-        let [x, y, z] =
-            std::array::from_fn(|c| r[c] - self.hip[c] + if c == 2 { self.foot_radius } else { 0.0 });
+        let [x, y, z] = self.foot_from_hip(r);
         let drop = y * y + z * z - self.lateral * self.lateral;
         let distance = x.hypot(drop.max(0.0).sqrt() + self.rise);
         drop > 0.0 && distance < self.thigh + self.shank && distance > (self.thigh - self.shank).abs()
     }
 
     /// The posture for the contact point r, base frame from the center of mass.
-    pub fn posture<T: Scalar>(&self, r: [T; 3]) -> PlanarPosture<T> {
+    pub fn posture<T: Scalar>(&self, r: [T; 3]) -> PlanarPosture<'_, T> {
         let (a, b, l) = (self.thigh, self.shank, self.lateral);
-        let x = r[0] + -self.hip[0];
-        let y = r[1] + -self.hip[1];
-        let z = r[2] + (self.foot_radius - self.hip[2]);
+        let [x, y, z] = self.foot_from_hip(r);
         let drop = rounded_root(y * y + z * z + -l * l, DROP_ROUNDING * (a + b) * (a + b));
         // (y, z) = (l cos α + drop sin α, l sin α − drop cos α).
         let scale = (drop * drop + l * l).recip();
@@ -148,9 +173,28 @@ impl Planar {
             knee: thigh.map(|c| c * a),
             thigh,
             bent: [sin, cos],
-            leg: *self,
+            leg: self,
         }
     }
+}
+
+/// The axes of a leg of three joints, in rows, where they are not the base's.
+fn axes(chain: &Chain, stance: &[f64]) -> Option<Matrix3<f64>> {
+    let along = |axis: Vector3<f64>, other: Vector3<f64>| axis.cross(&other).norm() < STRAIGHT;
+    let [first, second] = [0, 1].map(|j| chain.joints[j].axis);
+    if along(first, Vector3::x()) && along(second, Vector3::y()) {
+        return None;
+    }
+    let mut angles = stance.to_vec();
+    angles[0] = 0.0;
+    let foot = Vector3::from(chain.foot(&angles)) - chain.joints[0].position;
+    let up = first.cross(&second);
+    let side = if up.dot(&foot) > 0.0 { -second } else { second };
+    Some(Matrix3::from_rows(&[first, side, first.cross(&side)].map(|axis| axis.transpose())))
+}
+
+fn rotated<T: Scalar>(frame: &Matrix3<f64>, v: [T; 3]) -> [T; 3] {
+    std::array::from_fn(|i| v[0] * frame[(i, 0)] + v[1] * frame[(i, 1)] + v[2] * frame[(i, 2)])
 }
 
 /// An angle within half a turn of another.
@@ -158,7 +202,7 @@ fn wrapped(angle: f64, near: f64) -> f64 {
     angle - TAU * ((angle - near) / TAU).round()
 }
 
-impl<T: Scalar> PlanarPosture<T> {
+impl<T: Scalar> PlanarPosture<'_, T> {
     /// The angles φ and κ, rad; their rates are those of HFE and KFE, up to the sign.
     pub fn swing_angles(&self) -> [T; 2] {
         [self.thigh[0].atan2(self.thigh[1]), self.bent[0].atan2(self.bent[1])]
@@ -176,8 +220,13 @@ impl<T: Scalar> PlanarPosture<T> {
         })
     }
 
-    /// A vector in the plane of the leg, given by its forward and down components, in the base frame.
-    fn in_base(&self, [forward, down]: [T; 2]) -> [T; 3] {
+    /// Whether the first joint is an abduction about the base's x axis.
+    pub fn abducts(&self) -> bool {
+        self.leg.frame.is_none()
+    }
+
+    /// A vector in the plane of the leg, given by its forward and down components, in the leg's axes.
+    fn out_of_plane(&self, [forward, down]: [T; 2]) -> [T; 3] {
         let [sin, cos] = self.abduction;
         [forward, down * sin, -(down * cos)]
     }
@@ -191,10 +240,10 @@ impl<T: Scalar> PlanarPosture<T> {
             self.knee[0] + forward * along + down * across,
             self.knee[1] + down * along + -(forward * across),
         ];
-        let [x, y, z] = self.in_base([point[0], point[1] + -self.leg.rise]);
+        let [x, y, z] = self.out_of_plane([point[0], point[1] + -self.leg.rise]);
         let [sin, cos] = self.abduction;
-        let Planar { hip, lateral: l, .. } = self.leg;
-        [x + hip[0], y + cos * l + hip[1], z + sin * l + hip[2]]
+        let Planar { hip, lateral: l, .. } = *self.leg;
+        self.leg.in_base([x + hip[0], y + cos * l + hip[1], z + sin * l + hip[2]])
     }
 
     /// ∂r/∂q, m: the derivatives of the contact point, base frame, with respect to HAA, HFE and KFE, one vector for each joint. With a
@@ -202,20 +251,20 @@ impl<T: Scalar> PlanarPosture<T> {
     pub fn jacobian(&self) -> [[T; 3]; 3] {
         let [sin, cos] = self.abduction;
         let [x, h] = self.foot;
-        let Planar { lateral: l, foot_radius: radius, rise, counting, .. } = self.leg;
-        // The contact point relative to the HAA axis; the radius is along the base's z axis.
+        let Planar { lateral: l, lift, rise, counting, .. } = *self.leg;
+        // The contact point relative to the HAA axis.
         let drop = h + -rise;
-        let y = cos * l + drop * sin;
-        let z = sin * l - drop * cos + -radius;
+        let y = cos * l + drop * sin + -lift[1];
+        let z = sin * l - drop * cos + -lift[2];
         let zero = y * 0.0;
-        // axis × (v − radius ẑ) with axis = (0, cos α, sin α).
+        // axis × (v − lift) with axis = (0, cos α, sin α).
         let about = |v: [T; 2]| {
-            let [_, up_y, up_z] = self.in_base([zero, v[0]]);
-            [-v[1] - cos * radius, up_y, up_z]
+            let [_, up_y, up_z] = self.out_of_plane([zero, v[0]]);
+            [sin * lift[1] - v[1] - cos * lift[2], up_y - sin * lift[0], up_z + cos * lift[0]]
         };
         let [knee_x, knee_h] = self.knee;
         let columns = [[zero, -z, y], about([x, h]), about([x - knee_x, h - knee_h])];
-        std::array::from_fn(|j| columns[j].map(|entry| entry * counting.sign[j]))
+        std::array::from_fn(|j| self.leg.in_base(columns[j].map(|entry| entry * counting.sign[j])))
     }
 }
 
@@ -226,14 +275,16 @@ mod tests {
     use super::*;
     use crate::leg::chain::tests::leg as leg_of;
 
+    const RADIUS: f64 = 0.03;
     const LEG: Planar = Planar {
+        frame: None,
         hip: [0.3, -0.1, 0.05],
         rise: 0.0,
         lateral: -0.2,
         thigh: 0.28,
         shank: 0.33,
         bend: -1.0,
-        foot_radius: 0.03,
+        lift: [0.0, 0.0, RADIUS],
         counting: Counting { sign: [1.0; 3], zero: [0.0; 2], middle: [0.0; 3] },
     };
     /// A point of the shank.
@@ -257,7 +308,7 @@ mod tests {
             for q in [[0.2, 0.6, 1.2], [-0.4, 0.3, 0.5], [0.1, 0.7, 1.9], [0.0, 0.9, 2.3]] {
                 let q = [q[0], -bend * q[1], bend * q[2]];
                 let (center, knee) = forward(&leg, q);
-                let below = -Vector3::z() * leg.foot_radius;
+                let below = -Vector3::z() * RADIUS;
                 let contact = center + below;
                 assert!(leg.reaches(contact.into()));
                 let found = leg.posture::<f64>(contact.into());
@@ -290,9 +341,20 @@ mod tests {
         for axes in [
             [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
             [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
+            // The legs of insects, on both sides, and a hip that is tilted forward.
+            [[0.0, 0.0, 1.0], [-0.6, 0.8, 0.0], [-0.6, 0.8, 0.0]],
+            [[0.0, 0.0, -1.0], [-0.6, -0.8, 0.0], [0.6, 0.8, 0.0]],
+            [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]],
         ] {
             let mut chain = leg_of(&axes);
             chain.joints[1].position.z = 0.03;
+            let yaws = axes[0][0] == 0.0;
+            if yaws {
+                // Out to the side, across the axes of the other joints.
+                let out = Vector3::from(axes[1]).cross(&Vector3::z());
+                chain.joints[1].position = out * 0.15;
+                chain.joints[2].position = out * 0.2 - Vector3::z() * 0.02;
+            }
             for q in [[0.2, 0.3, 1.2], [-0.4, -0.2, -1.5], [0.1, 0.3, 0.9]] {
                 let leg = Planar::of_chain(&chain, &q, 0.02).unwrap();
                 let contact = Vector3::from(chain.foot(&q)) - Vector3::z() * 0.02;
@@ -307,20 +369,21 @@ mod tests {
                     assert!((Vector3::from(column) - expected).norm() < 2e-3, "joint {j} at {q:?}");
                 }
                 let knee = Vector3::from(posture.on_shank([0.0; 2]));
-                let plane = Vector3::new(0.0, chain.foot.y, 0.0);
+                let axis = chain.joints[2].axis;
+                let plane = axis * chain.foot.dot(&axis);
                 assert!((knee - Vector3::from(placed.point(2, &plane))).norm() < 1e-3);
             }
         }
-        let yaw = leg_of(&[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert!(Planar::of_chain(&yaw, &[0.0; 3], 0.02).is_none());
+        let skewed = leg_of(&[[0.6, 0.8, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert!(Planar::of_chain(&skewed, &[0.0; 3], 0.02).is_none());
     }
 
     #[test]
     fn points_of_the_shank_keep_their_distances() {
         let (contact, knee) = forward(&LEG, [0.2, 0.5, -1.2]);
-        let contact = contact - Vector3::z() * LEG.foot_radius;
+        let contact = contact - Vector3::z() * RADIUS;
         let at = |point: [f64; 2]| Vector3::from(LEG.posture::<f64>(contact.into()).on_shank(point));
-        assert!((at([LEG.shank, 0.0]) - (contact + Vector3::z() * LEG.foot_radius)).norm() < 1e-3);
+        assert!((at([LEG.shank, 0.0]) - (contact + Vector3::z() * RADIUS)).norm() < 1e-3);
         let corner = at(CORNER);
         assert!(((corner - knee).norm() - CORNER[0].hypot(CORNER[1])).abs() < 1e-3);
         // The knee of this leg points forward and its shank back and down, so the outside is behind the line.

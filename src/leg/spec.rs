@@ -196,13 +196,14 @@ impl LegSpec {
 
     fn of_closed_form(&self, closed: &ClosedForm) -> Leg {
         let kinematics = Planar {
+            frame: None,
             hip: closed.hip,
             rise: 0.0,
             lateral: closed.lateral,
             thigh: closed.thigh,
             shank: closed.shank,
             bend: closed.bend,
-            foot_radius: self.foot_radius,
+            lift: [0.0, 0.0, self.foot_radius],
             counting: Counting::default(),
         };
         let limits = closed.torque_limit.map(|torque| (closed.speed_limit, torque));
@@ -301,13 +302,13 @@ impl LegSpec {
             );
             return bad("stance", what);
         }
-        let planar = Planar::of_chain(&chain, &stance, self.foot_radius).map(Kinematics::Planar);
-        if planar.is_none() && self.is_sagittal() {
+        let planar = Planar::of_chain(&chain, &stance, self.foot_radius);
+        if self.is_sagittal() && planar.is_none_or(|leg| leg.frame.is_some()) {
             let what = "given two whose axes are not the base's y axis, allowed: two about y (pitch and pitch), or three to seven about any axes";
             return bad("joints", what);
         }
         let serial = || Serial::new(&chain, &stance, self.foot_radius).map(Kinematics::Serial);
-        let Some(kinematics) = planar.or_else(serial) else {
+        let Some(kinematics) = planar.map(Kinematics::Planar).or_else(serial) else {
             return bad("foot", "lies on the axis of the last joint, which cannot move it");
         };
         let limits = chain.joints.iter().map(|joint| (joint.speed_limit, joint.torque_limit)).unzip();
@@ -316,10 +317,10 @@ impl LegSpec {
 
     /// Refuses keys of the closed form that contradict the joints.
     fn agree(&self, leg: &Leg, closed: &ClosedForm) -> Result<(), BadLeg> {
-        let Kinematics::Planar(found) = &leg.kinematics else {
+        let Some(found) = leg.abducting() else {
             return bad(
                 "hip",
-                "given with joints whose axes are not x, y, y, which have no closed form; leave it out",
+                "given with joints whose axes are not x, y, y, which it does not describe; leave it out",
             );
         };
         let most = AGREEMENT * (found.thigh + found.shank);
