@@ -71,7 +71,8 @@ impl Prepared {
         }
         // A request to stop takes effect at the first iteration.
         let _ = observer(&Event::Step(Step::Terrain));
-        let ground = terrain::build(scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+        let ground =
+            terrain::build(scenario, &loaded.robot, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
         loaded.ensure_inside(ground.field.extent())?;
         for note in &ground.report.notes {
             let _ = observer(&Event::Note(&format!("terrain: {note}")));

@@ -42,6 +42,11 @@ const LONGEST_NAME: usize = 100;
 /// Radius of a foot, in standing heights, where it is not known.
 const TYPICAL_FOOT: f64 = 0.07;
 
+/// The size in ANYmals of a robot with a standing height, m.
+pub fn size_of(standing_height: f64) -> f64 {
+    (standing_height / ANYMAL_HEIGHT / SIZE_STEP).round().max(1.0) * SIZE_STEP
+}
+
 /// `[robot]` of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -224,10 +229,12 @@ impl Robot {
 
     /// The robot's size in ANYmals, by its standing height: 1 for all ANYmals. Clearances and margins are proportional to it.
     pub fn size(&self) -> f64 {
-        (self.bare_height.unwrap_or_else(|| self.standing_height()) / ANYMAL_HEIGHT / SIZE_STEP)
-            .round()
-            .max(1.0)
-            * SIZE_STEP
+        size_of(self.bare_height.unwrap_or_else(|| self.standing_height()))
+    }
+
+    /// The unit of its times: how long it takes to fall or to swing like a pendulum, in those of ANYmal.
+    pub fn time_scale(&self) -> f64 {
+        self.size().sqrt()
     }
 
     /// Radius of the largest foot, m; a typical one for the robot's height if its file describes no leg.

@@ -41,7 +41,7 @@ fn problem_of(robot: &str, terrain: &str, formulation: &str, extra: &str) -> Gai
     );
     let scenario: Scenario = toml::from_str(&text).expect("a scenario");
     let robot = Robot::load(&scenario.robot, ".".as_ref()).expect("a robot");
-    let ground = warpgait::terrain::build(&scenario, ".".as_ref()).expect("a ground");
+    let ground = warpgait::terrain::build(&scenario, &robot, ".".as_ref()).expect("a ground");
     let surfaces = Surfaces::of(&scenario, &robot, &ground).expect("surfaces");
     // The shear leans with the slope, so that no block of J vanishes by symmetry; a second one bends x and y too.
     let map = bent(&WarpMap::shear(&surfaces.posture, &scenario.map).expect("a map"));

@@ -13,7 +13,7 @@ fn ground(text: &str, folder: &Path) -> Ground {
         "[contact]\nfootholds = \"anywhere\"\n[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n"
     );
     let loaded = scenario::load_text("s.toml", &whole, folder, &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
-    build(&loaded.scenario, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
+    build(&loaded.scenario, &loaded.robot, folder).unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
 /// A PNG file; `palette` and `transparency` are the PLTE and tRNS chunks.

@@ -10,7 +10,7 @@ use warpgait::{Error, scenario};
 fn ground(text: &str, folder: &Path) -> warpgait::Result<Ground> {
     let text = format!("[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\n{text}\n");
     let loaded = scenario::load_text("s.toml", &text, folder, &[])?;
-    build(&loaded.scenario, folder).map_err(|e| loaded.locate(e))
+    build(&loaded.scenario, &loaded.robot, folder).map_err(|e| loaded.locate(e))
 }
 
 /// The message with which a terrain is refused; it has file and line.

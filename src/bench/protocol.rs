@@ -361,7 +361,7 @@ mod tests {
                     let coarse = ["terrain.spacing=0.2".into()];
                     let loaded =
                         scenario::load_text(&case.name, &case.scenario, ".".as_ref(), &coarse).unwrap();
-                    let ground = terrain::build(&loaded.scenario, &loaded.base_dir);
+                    let ground = terrain::build(&loaded.scenario, &loaded.robot, &loaded.base_dir);
                     assert!(ground.is_ok(), "{}", case.name);
                 }
             }
@@ -375,7 +375,7 @@ mod tests {
         for case in cases.iter().filter(|case| case.method == "direct") {
             let coarse = ["terrain.spacing=0.05".into()];
             let loaded = scenario::load_text(&case.name, &case.scenario, ".".as_ref(), &coarse).unwrap();
-            let ground = terrain::build(&loaded.scenario, &loaded.base_dir).unwrap();
+            let ground = terrain::build(&loaded.scenario, &loaded.robot, &loaded.base_dir).unwrap();
             let surfaces = terrain::Surfaces::of(&loaded.scenario, &loaded.robot, &ground).unwrap();
             assert!(
                 loaded.scenario.goal.detours && surfaces.bends.iter().all(Vec::is_empty),

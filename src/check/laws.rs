@@ -176,11 +176,7 @@ const ANYMAL_FOOT: f64 = 0.03;
 /// Which part of a law's default limit holds for a robot. It is smaller for smaller robots, and not larger for larger ones.
 fn part(law: &CheckedLaw, robot: &MetaRobot) -> f64 {
     let is_in = |laws: &[&CheckedLaw]| laws.iter().any(|known| known.name == law.name);
-    let height = || {
-        // Plans of version 0.1.0 and before do not have it.
-        let sum: f64 = robot.nominal.iter().map(|foot| -foot[2]).sum();
-        if robot.nominal.is_empty() { 1.0 } else { sum / (robot.nominal.len() as f64 * ANYMAL_HEIGHT) }
-    };
+    let height = || robot.standing_height().map_or(1.0, |height| height / ANYMAL_HEIGHT);
     let part = if is_in(&BY_HEIGHT) {
         height()
     } else if is_in(&BY_SPEED) {

@@ -4,6 +4,7 @@
 use super::laws;
 use super::subject::{Finding, Subject, Worst, larger};
 use crate::heightfield::Heightfield;
+use crate::robot::size_of;
 use crate::scenario::{Footholds, TerrainSpec};
 use crate::{Error, Result, terrain};
 
@@ -18,12 +19,13 @@ pub(super) fn findings(s: &Subject, findings: &mut Vec<Finding>) -> Result<()> {
     match &s.scenario.terrain {
         TerrainSpec::Heightmap(spec) => {
             let footholds = s.scenario.footholds();
+            let size = s.plan.meta.robot.standing_height().map_or(1.0, size_of);
             // The plan's grid may be finer than that of the file.
             let spacing = spec.spacing.unwrap_or(UNKNOWN_SPACING).max(s.plan.ground.spacing[0]);
             let reach = match footholds {
-                Footholds::Patches => KERNEL * spec.smoothing(footholds, spacing),
+                Footholds::Patches => KERNEL * spec.smoothing(footholds, spacing, size),
                 // A spline through the smoothed cells.
-                Footholds::Anywhere => KERNEL * spec.smoothing(footholds, spacing) + spacing,
+                Footholds::Anywhere => KERNEL * spec.smoothing(footholds, spacing, size) + spacing,
             };
             if let Some(raw) = &s.plan.ground.raw {
                 findings.push((laws::SMOOTHING, Worst::overall(1e3 * beyond_raw(s, raw, reach))));

@@ -51,7 +51,8 @@ pub(super) fn map(arguments: &MapArguments, console: &Console) -> Result<Ending>
     listen_for_ctrl_c()?;
     let mut progress = ProgressLine::new(console.is_quiet());
     progress.show(&Event::Step(Step::Terrain));
-    let ground = terrain::build(&loaded.scenario, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
+    let ground =
+        terrain::build(&loaded.scenario, &loaded.robot, &loaded.base_dir).map_err(|e| loaded.locate(e))?;
     let outputs: Vec<&Path> = arguments.output.iter().map(PathBuf::as_path).collect();
     ensure_no_inputs(&outputs, &loaded.paths(&ground.inputs))?;
     let surfaces = Surfaces::of(&loaded.scenario, &loaded.robot, &ground).map_err(|e| loaded.locate(e))?;

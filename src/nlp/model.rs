@@ -198,6 +198,11 @@ impl Model {
         }
     }
 
+    /// The unit of the robot's times, in those of ANYmal ([`Robot::time_scale`]).
+    pub fn time_scale(&self) -> f64 {
+        self.size.sqrt()
+    }
+
     /// The leg of a foot whose leg the robot's file describes.
     ///
     /// # Panics

@@ -259,6 +259,12 @@ pub struct MetaRobot {
 }
 
 impl MetaRobot {
+    /// Mean height of the nominal places of the feet below the center of mass, m; none in plans of version 0.1.0 and before.
+    pub fn standing_height(&self) -> Option<f64> {
+        let sum: f64 = self.nominal.iter().map(|foot| -foot[2]).sum();
+        (!self.nominal.is_empty()).then(|| sum / self.nominal.len() as f64)
+    }
+
     /// [`Self::legs`] of a robot in a scenario.
     pub fn legs_of(robot: &Robot, scenario: &Scenario) -> Vec<LegSpec> {
         if scenario.legs() == Legs::Massless || robot.body().is_none() {

@@ -15,8 +15,10 @@ use crate::scenario::{PostureSpec, Scenario, wrapped};
 use crate::terrain::Patch;
 use crate::trajectory::rotation::euler_angles;
 
-/// The base departs this long before the first swing, and arrives this long after the last one, s.
+/// The base departs this long before the first swing, and arrives this long after the last one, s, for a robot of ANYmal's size.
 const LEAD: f64 = 0.2;
+/// Longest time in which it speeds up and slows down, s, likewise.
+const LONGEST_RAMP: f64 = 0.8;
 /// Distance of the poses at which it is looked up which footholds are within reach, m, for a robot of ANYmal's size.
 const PROBES: f64 = 0.02;
 /// A foot that moves less than this fraction of the way counts as one that does.
@@ -107,8 +109,9 @@ impl<'a> BasePath<'a> {
         let swings = || layout.feet.iter().flat_map(|f| &f.swings).map(|s| s.swing);
         let first_lift_off = swings().map(|s| s.start).reduce(f64::min);
         let last_touch_down = swings().map(|s| s.end).reduce(f64::max);
-        let depart = first_lift_off.map_or(0.0, |k| k * layout.time_step - LEAD).max(0.0);
-        let arrive = last_touch_down.map_or(horizon, |k| k * layout.time_step + LEAD).min(horizon);
+        let lead = model.time_scale() * LEAD;
+        let depart = first_lift_off.map_or(0.0, |k| k * layout.time_step - lead).max(0.0);
+        let arrive = last_touch_down.map_or(horizon, |k| k * layout.time_step + lead).min(horizon);
         let stops: Vec<(f64, f64)> = scenario
             .stops()
             .iter()
@@ -122,7 +125,17 @@ impl<'a> BasePath<'a> {
             length: way.length,
             pace: match model.cycle {
                 Some(_) => Pace::even(horizon, way.length, layout.time_step),
-                None => Pace::new([depart, arrive], way.length, &stops, layout.intervals, layout.time_step),
+                None => {
+                    let longest_ramp = model.time_scale() * LONGEST_RAMP;
+                    Pace::new(
+                        [depart, arrive],
+                        longest_ramp,
+                        way.length,
+                        &stops,
+                        layout.intervals,
+                        layout.time_step,
+                    )
+                }
             },
             bent: bent.transpose()?,
             way,

@@ -2,16 +2,16 @@
 
 use super::retiming::retimed;
 
-/// Time in which the base speeds up and slows down: this fraction of its travel time, …
+/// Time in which the base speeds up and slows down: this fraction of its travel time, but at most a given one.
 const RAMP_FRACTION: f64 = 0.2;
-/// … but at most this long, s.
-const LONGEST_RAMP: f64 = 0.8;
 
 /// How far the base is at each time.
 #[derive(Clone, Debug)]
 pub struct Pace {
     /// When the base departs and when it arrives, s.
     travel: [f64; 2],
+    /// Longest time of speeding up and of slowing down, s.
+    longest_ramp: f64,
     /// Of the whole way, m.
     length: f64,
     /// Between two samples, s.
@@ -25,10 +25,11 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Between departure and arrival, s, so that each stop at a given time, s, is where it is on the way, m. There are so many intervals of
-    /// time.
+    /// Between departure and arrival, s, with ramps of at most a given time, s, so that each stop at a given time, s, is where it is on the
+    /// way, m. There are so many intervals of time.
     pub fn new(
         mut travel: [f64; 2],
+        longest_ramp: f64,
         length: f64,
         stops: &[(f64, f64)],
         intervals: usize,
@@ -48,12 +49,20 @@ impl Pace {
             let nominal: Vec<f64> = (0..=intervals).map(at).collect();
             retimed(&nominal, &[], &pins, time_step)
         });
-        Self { travel, length, time_step, even: false, timed, pins }
+        Self { travel, longest_ramp, length, time_step, even: false, timed, pins }
     }
 
     /// The same speed from the start to the end, s, and beyond them.
     pub fn even(horizon: f64, length: f64, time_step: f64) -> Self {
-        Self { travel: [0.0, horizon], length, time_step, even: true, timed: None, pins: Vec::new() }
+        Self {
+            travel: [0.0, horizon],
+            longest_ramp: 0.0,
+            length,
+            time_step,
+            even: true,
+            timed: None,
+            pins: Vec::new(),
+        }
     }
 
     /// How long the base travels, s.
@@ -66,7 +75,7 @@ impl Pace {
         match &self.timed {
             Some(timed) => interpolated(timed, t / self.time_step),
             None if self.even => self.length * t / self.travel[1],
-            None => self.length * progress(t, self.travel[0], self.travel[1]),
+            None => self.length * progress(t, self.travel, self.longest_ramp),
         }
     }
 }
@@ -88,10 +97,10 @@ fn piecewise(knots: &[(f64, f64)], t: f64) -> f64 {
     }
 }
 
-/// Fraction of the way covered at time t: constant speed with parabolic ends between `from` and `to`.
-fn progress(t: f64, from: f64, to: f64) -> f64 {
+/// Fraction of the way covered at time t: constant speed between `from` and `to` with parabolic ends, at most `longest_ramp` long.
+fn progress(t: f64, [from, to]: [f64; 2], longest_ramp: f64) -> f64 {
     let duration = to - from;
-    let ramp = (RAMP_FRACTION * duration).min(LONGEST_RAMP);
+    let ramp = (RAMP_FRACTION * duration).min(longest_ramp);
     let s = (t - from).clamp(0.0, duration);
     let speed = 1.0 / (duration - ramp);
     if s < ramp {
@@ -111,7 +120,7 @@ mod tests {
     fn progress_runs_from_zero_to_one_without_a_jump() {
         let mut before = 0.0;
         for i in 0..=1000 {
-            let u = progress(f64::from(i) * 0.01, 0.3, 9.7);
+            let u = progress(f64::from(i) * 0.01, [0.3, 9.7], 0.8);
             assert!(u >= before - 1e-12 && u - before < 2e-3);
             before = u;
         }
@@ -121,7 +130,7 @@ mod tests {
     #[test]
     fn stops_are_met_at_their_times_and_the_rest_is_divided_by_length() {
         // Two stops at one place: the base waits there.
-        let pace = Pace::new([0.3, 9.7], 3.0, &[(4.0, 1.0), (6.0, 1.0)], 200, 0.05);
+        let pace = Pace::new([0.3, 9.7], 0.8, 3.0, &[(4.0, 1.0), (6.0, 1.0)], 200, 0.05);
         for (t, s) in [(0.0, 0.0), (4.0, 1.0), (6.0, 1.0), (10.0, 3.0)] {
             assert!((pace.at(t) - s).abs() < 0.02, "{t}: {}", pace.at(t));
         }

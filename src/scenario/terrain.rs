@@ -363,19 +363,25 @@ pub struct HeightmapSpec {
 impl HeightmapSpec {
     /// Default smoothing: this many cells, because the finest detail of a scan is noise …
     pub const SMOOTHING_CELLS: f64 = 1.5;
-    /// … but at least this length, m: a foot does not feel anything finer.
+    /// … but at least this length, m, for a robot of ANYmal's size: a foot does not feel anything finer.
     pub const SMOOTHING_LENGTH: f64 = 0.03;
-    /// … and at most this length, m, however coarse the scan: ground that is moved further under a foot is not the ground any more.
+    /// … and at most this length, m, likewise, however coarse the scan: ground that is moved further under a foot is not the ground any more.
     pub const SMOOTHING_CEILING: f64 = 0.06;
     /// Smoothing over more cells than this is refused; it would take minutes.
     pub const SMOOTHING_LIMIT: f64 = 50.0;
 
-    /// Standard deviation of the smoothing of cells of a spacing, m.
-    pub fn smoothing(&self, footholds: Footholds, spacing: f64) -> f64 {
+    /// The least and the greatest default smoothing for a robot of a size, m.
+    pub fn smoothing_range(size: f64) -> [f64; 2] {
+        [Self::SMOOTHING_LENGTH, Self::SMOOTHING_CEILING].map(|length| size * length)
+    }
+
+    /// Standard deviation of the smoothing of cells of a spacing, m, for a robot of a size.
+    pub fn smoothing(&self, footholds: Footholds, spacing: f64, size: f64) -> f64 {
         let default = match footholds {
             Footholds::Patches => 0.0,
             Footholds::Anywhere => {
-                (Self::SMOOTHING_CELLS * spacing).clamp(Self::SMOOTHING_LENGTH, Self::SMOOTHING_CEILING)
+                let [least, most] = Self::smoothing_range(size);
+                (Self::SMOOTHING_CELLS * spacing).clamp(least, most)
             }
         };
         self.smoothing.unwrap_or(default.min(Self::SMOOTHING_LIMIT * spacing))

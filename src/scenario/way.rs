@@ -7,7 +7,7 @@ use crate::Result;
 use crate::input::Document;
 use crate::robot::Robot;
 
-/// Time for standing at both ends, and for speeding up and slowing down, s.
+/// Time for standing at both ends, and for speeding up and slowing down, s, for a robot of ANYmal's size.
 const ENDS: f64 = 1.5;
 /// By how much a given horizon may differ from that of the speed, s.
 const SAME: f64 = 0.5;
@@ -140,7 +140,7 @@ pub(super) fn horizon(scenario: &Scenario, robot: &Robot) -> Option<f64> {
     let steps = if scenario.gait.periodic {
         (length / speed / step).round()
     } else {
-        ((length / speed + ENDS) / step).ceil()
+        ((length / speed + ENDS * robot.time_scale()) / step).ceil()
     };
     let seconds = step * steps;
     Some((1e9 * seconds).round() / 1e9)

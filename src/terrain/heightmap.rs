@@ -93,7 +93,7 @@ pub fn read(spec: &HeightmapSpec, base_dir: &Path) -> Result<Heightmap> {
     Ok(Heightmap { scan, source, inputs })
 }
 
-/// The ground of a heightmap that was read.
+/// The ground of a heightmap that was read, for a robot of a size.
 ///
 /// # Errors
 /// [`Error::Key`] for heights that cannot be turned into a heightfield.
@@ -101,13 +101,14 @@ pub fn ground(
     kind: &'static str,
     spec: &HeightmapSpec,
     footholds: Footholds,
+    size: f64,
     heightmap: &Heightmap,
 ) -> Result<Ground> {
     let Heightmap { scan, source, inputs } = heightmap;
     if let Some(what) = spec.excess_of_smoothing(scan.grid.spacing[0]) {
         return Err(Error::key("terrain.smoothing", what));
     }
-    let mut ground = scan::ground(kind, spec, footholds, scan)?;
+    let mut ground = scan::ground(kind, spec, footholds, size, scan)?;
     ground.inputs.extend(inputs.iter().cloned());
     ground.report.notes.splice(0..0, source.notes.iter().cloned());
     Ok(ground)

@@ -28,6 +28,7 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::heightfield::Heightfield;
+use crate::robot::Robot;
 use crate::scenario::terrain::{Domain, HeightmapSpec};
 use crate::scenario::{Scenario, TerrainSpec};
 pub use contact::{ContactGround, FootNeeds};
@@ -40,27 +41,31 @@ pub use patch::Patch;
 pub use scan::Scan;
 pub use surfaces::Surfaces;
 
-/// Builds the ground that a scenario specifies; its relative paths start at `base_dir`. Assumes that the ranges of
+/// Builds the ground that a scenario specifies for its robot; its relative paths start at `base_dir`. Assumes that the ranges of
 /// [`TerrainSpec`] hold, as loading a scenario ensures.
 ///
 /// # Errors
 /// [`Error::Key`](crate::Error::Key) for files that cannot be read or decoded, expressions that fail, and heights that are not
 /// finite. Says what, where, and what is allowed.
-pub fn build(scenario: &Scenario, base_dir: &Path) -> Result<Ground> {
-    build_with_source(scenario, base_dir).map(|(ground, _)| ground)
+pub fn build(scenario: &Scenario, robot: &Robot, base_dir: &Path) -> Result<Ground> {
+    build_with_source(scenario, robot, base_dir).map(|(ground, _)| ground)
 }
 
 /// The same, with the heights as measured and what their file was taken for; none for a terrain that is a function.
 ///
 /// # Errors
 /// Those of [`build`].
-pub fn build_with_source(scenario: &Scenario, base_dir: &Path) -> Result<(Ground, Option<Heightmap>)> {
+pub fn build_with_source(
+    scenario: &Scenario,
+    robot: &Robot,
+    base_dir: &Path,
+) -> Result<(Ground, Option<Heightmap>)> {
     let kind = scenario.terrain.kind();
     match Shape::of(&scenario.terrain)? {
         Shape::Function(domain, h) => Ok((function::ground(kind, domain, h)?, None)),
         Shape::Heightmap(spec) => {
             let heightmap = heightmap::read(spec, base_dir)?;
-            let ground = heightmap::ground(kind, spec, scenario.footholds(), &heightmap)?;
+            let ground = heightmap::ground(kind, spec, scenario.footholds(), robot.size(), &heightmap)?;
             Ok((ground, Some(heightmap)))
         }
     }

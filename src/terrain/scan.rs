@@ -27,18 +27,24 @@ pub struct Scan {
     pub heights: Vec<f64>,
 }
 
-/// Fills, smooths, interpolates, crops and refines, and reports what it did.
+/// Fills, smooths, interpolates, crops and refines, and reports what it did, for a robot of a size.
 ///
 /// # Errors
 /// [`Error::Key`] if nothing was measured, the heights differ too much or are too large, or the extent exceeds the scan.
-pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, scan: &Scan) -> Result<Ground> {
+pub fn ground(
+    kind: &'static str,
+    spec: &HeightmapSpec,
+    footholds: Footholds,
+    size: f64,
+    scan: &Scan,
+) -> Result<Ground> {
     let refuse =
         |what: &dyn std::fmt::Display| Error::key("terrain.file", format!("{:?}: {what}", spec.file));
     let Scan { grid, heights: measured } = scan;
     let grid = *grid;
     let spacing = grid.spacing[0];
     let extent = cropped(spec.extent, grid.extent())?;
-    let smoothing = spec.smoothing(footholds, spacing);
+    let smoothing = spec.smoothing(footholds, spacing, size);
 
     let mut filled = measured.clone();
     fill_holes(grid.columns, &mut filled).map_err(|e| refuse(&e))?;
@@ -93,7 +99,7 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, sc
     let mut report = GroundReport::of(kind, &field, &error);
     report.holes_filled = holes_filled;
     report.smoothing = smoothing;
-    report.notes = notes(spec, footholds, &grid, cells, &report);
+    report.notes = notes(spec, footholds, size, &grid, cells, &report);
     let unknown = unknown.contains(&true).then_some(unknown);
     Ok(Ground { field, raw: Some(raw), unknown, report, inputs: Vec::new() })
 }
@@ -102,19 +108,19 @@ pub fn ground(kind: &'static str, spec: &HeightmapSpec, footholds: Footholds, sc
 fn notes(
     spec: &HeightmapSpec,
     footholds: Footholds,
+    size: f64,
     grid: &Grid,
     cells: usize,
     report: &GroundReport,
 ) -> Vec<String> {
     let mut notes = Vec::new();
     if spec.smoothing.is_none() && footholds == Footholds::Anywhere {
+        let [least, most] = HeightmapSpec::smoothing_range(size);
         notes.push(format!(
-            "smoothed over {:.3} m by default ({} cells, from {} to {} m; terrain.smoothing sets it); \
+            "smoothed over {:.3} m by default ({} cells, from {least:.3} to {most:.3} m; terrain.smoothing sets it); \
              heights moved by {:.4} m rms, {:.4} m at most",
             report.smoothing,
             HeightmapSpec::SMOOTHING_CELLS,
-            HeightmapSpec::SMOOTHING_LENGTH,
-            HeightmapSpec::SMOOTHING_CEILING,
             report.fit_error_rms,
             report.fit_error_max
         ));

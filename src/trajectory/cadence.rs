@@ -5,7 +5,7 @@ use crate::robot::Robot;
 use crate::scenario::{Footholds, GaitKind, Scenario, SectionSpec};
 use crate::{Error, Result};
 
-/// Duration of a cycle, s, if neither the scenario nor the robot specifies one.
+/// Duration of a cycle, s, if neither the scenario nor the robot specifies one, for a robot of ANYmal's size.
 const CYCLE: f64 = 1.0;
 /// Length of the cycle of a walk over smooth ground, in the robot's own: swings last 0.21 of that, instead of 0.25 over patches.
 const SMOOTH_WALK_CYCLE: f64 = 1.25;
@@ -19,7 +19,7 @@ const HOP_CYCLE: f64 = 2.2;
 /// Froude numbers v²/(g h) up to which trot, tripod, pace and bound have their usual cadence, and from which on they have that of a flying
 /// trot.
 const SPEEDS: [f64; 2] = [0.05, 0.5];
-/// Time at both ends in which the base hardly moves, s.
+/// Time at both ends in which the base hardly moves, s, for a robot of ANYmal's size.
 const ENDS: f64 = 1.0;
 /// m/s².
 const GRAVITY: f64 = 9.81;
@@ -44,7 +44,7 @@ pub(super) struct Cadence {
 
 /// How far the mean speed is from an ordinary one to one for which the feet must leave the ground, 0 to 1; in proportion to the speed.
 fn quickness(scenario: &Scenario, robot: &Robot) -> f64 {
-    let ends = if scenario.gait.periodic { 0.0 } else { ENDS };
+    let ends = if scenario.gait.periodic { 0.0 } else { ENDS * robot.time_scale() };
     let speed = scenario.way_length() / (scenario.horizon - ends).max(scenario.time_step);
     let [ordinary, flying] = SPEEDS.map(|froude| (froude * GRAVITY * robot.standing_height()).sqrt());
     ((speed - ordinary) / (flying - ordinary)).clamp(0.0, 1.0)
@@ -64,7 +64,7 @@ impl Cadence {
 
     fn usual(kind: GaitKind, scenario: &Scenario, robot: &Robot) -> Self {
         let feet = robot.feet.len() as f64;
-        let cycle = robot.gait_cycle.unwrap_or(CYCLE);
+        let cycle = robot.gait_cycle.unwrap_or(CYCLE * robot.time_scale());
         let turns = feet / TURNS * cycle;
         let falling = (robot.standing_height() / GRAVITY).sqrt();
         // A multiple of two time steps, so that all flights last as long.

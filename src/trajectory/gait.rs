@@ -10,7 +10,7 @@ use crate::robot::Robot;
 use crate::scenario::{GaitKind, Scenario, SectionSpec, section_key};
 use crate::{Error, Result};
 
-/// Least time of standing at the start and at the end, s, in which the base accelerates and stops.
+/// Least time of standing at the start and at the end, s, in which the base accelerates and stops, for a robot of ANYmal's size.
 const STAND: f64 = 0.3;
 /// The same on each side of the change from one gait to another.
 const CHANGE: f64 = 0.1;
@@ -66,10 +66,11 @@ impl Gait {
             _ => sequence(scenario, robot, fraction)?,
         };
         if gait.optimize_durations {
+            let farthest = switches::FARTHEST * robot.time_scale();
             for (swings, foot) in swings.iter_mut().zip(&robot.feet) {
-                switches::make_room(swings, intervals, step, gait.duration_bounds).map_err(|what| {
-                    Error::key("gait.optimize_durations", format!("foot {}: {what}", foot.name))
-                })?;
+                switches::make_room(swings, intervals, step, gait.duration_bounds, farthest).map_err(
+                    |what| Error::key("gait.optimize_durations", format!("foot {}: {what}", foot.name)),
+                )?;
             }
         }
         Ok(Self { intervals, swings })
@@ -129,11 +130,12 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
     let gait = &scenario.gait;
     let sections = gait.sections();
     let ends = gait.section_ends(scenario.horizon);
+    let change = CHANGE * robot.time_scale();
     // Feet in the air at the start land first.
     let mut swings: Vec<Vec<Swing>> = (0..robot.feet.len())
         .map(|foot| Ok(begun(scenario, foot)?.into_iter().collect()))
         .collect::<Result<_>>()?;
-    let landed = swings.iter().flatten().map(|s| s.end * scenario.time_step + CHANGE).fold(0.0, f64::max);
+    let landed = swings.iter().flatten().map(|s| s.end * scenario.time_step + change).fold(0.0, f64::max);
     for (n, section) in sections.iter().enumerate().filter(|(_, section)| section.kind.is_cyclic()) {
         let keyed = |e: Error| match e {
             Error::Key { key, what } if key != "horizon" => Error::key(section_key(gait, n, &key), what),
@@ -149,9 +151,9 @@ fn sequence(scenario: &Scenario, robot: &Robot, fraction: f64) -> Result<Vec<Vec
         let alone = |neighbor: Option<&SectionSpec>| neighbor.is_none_or(|s| !s.kind.is_cyclic());
         // At ends at rest, beside a section that stands, and where the robot goes on moving.
         let stand = |(neighbor, moves): (Option<&SectionSpec>, bool)| match neighbor {
-            None if !moves => STAND,
+            None if !moves => STAND * robot.time_scale(),
             Some(_) if alone(neighbor) => 0.0,
-            _ => CHANGE,
+            _ => change,
         };
         let mut window = Window {
             from: if n == 0 { 0.0 } else { ends[n - 1] },

@@ -21,8 +21,8 @@ use super::node::LinearNode;
 use super::phase::Swing;
 use super::spline::SwingBasis;
 
-/// Greatest distance of a switch from its nominal time, s.
-const FARTHEST: f64 = 0.15;
+/// Greatest distance of a switch from its nominal time, s, for a robot of ANYmal's size.
+pub(super) const FARTHEST: f64 = 0.15;
 /// Shortest swing, in time steps: with fewer, the samples do not capture its path.
 pub const SHORTEST_SWING: f64 = 3.0;
 /// Samples of a stance that neither of its switches may enter: the width of two ramps.
@@ -48,7 +48,7 @@ pub fn snapped(time: f64) -> f64 {
     if (time - time.round()).abs() < ON_SAMPLE { time.round() } else { time }
 }
 
-/// Gives the switches of one foot room to move. `bounds` on the duration of a phase in s.
+/// Gives the switches of one foot room to move, at most `farthest`, s. `bounds` on the duration of a phase in s.
 ///
 /// # Errors
 /// The reason, in words, if the phases and the bounds leave no room.
@@ -57,6 +57,7 @@ pub(super) fn make_room(
     intervals: usize,
     step: f64,
     bounds: [f64; 2],
+    farthest: f64,
 ) -> Result<(), String> {
     let durations = phase_durations(swings, intervals);
     check_horizon(durations.len(), intervals as f64 * step, bounds)?;
@@ -64,7 +65,7 @@ pub(super) fn make_room(
         check_duration(n, &durations, step, bounds)?;
     }
     for (j, swing) in swings.iter_mut().enumerate() {
-        swing.room = room(j, &durations, step)?;
+        swing.room = room(j, &durations, step, farthest)?;
     }
     Ok(())
 }
@@ -108,12 +109,12 @@ fn check_duration(n: usize, durations: &[f64], step: f64, [least, most]: [f64; 2
 }
 
 /// The room of the switches of swing j, in samples: as much as its neighbors in time leave.
-fn room(j: usize, durations: &[f64], step: f64) -> Result<[f64; 2], String> {
+fn room(j: usize, durations: &[f64], step: f64, farthest: f64) -> Result<[f64; 2], String> {
     let [before, own, after] = [2 * j, 2 * j + 1, 2 * j + 2].map(|n| durations[n]);
     let left = if j == 0 { before - END_CORE } else { 0.5 * (before - CORE) };
     let right = if 2 * j + 3 == durations.len() { after - END_CORE } else { 0.5 * (after - CORE) };
     // At least one sample of the swing itself remains.
-    let most = (0.5 * (own - 1.0)).min(FARTHEST / step);
+    let most = (0.5 * (own - 1.0)).min(farthest / step);
     let room = [left.min(most), right.min(most)];
     if room.iter().any(|&room| room < LEAST_ROOM) {
         return Err(format!(
@@ -325,17 +326,17 @@ mod tests {
     #[test]
     fn switches_do_not_interfere() {
         let mut swings = walk();
-        make_room(&mut swings, 80, 0.05, [0.1, 1.0]).expect("room");
+        make_room(&mut swings, 80, 0.05, [0.1, 1.0], FARTHEST).expect("room");
         assert_eq!(swings[0].room, [2.0, 2.0]);
         let mut fine: Vec<Swing> = walk().iter().map(|s| Swing::given(2.0 * s.start, 2.0 * s.end)).collect();
-        make_room(&mut fine, 160, 0.025, [0.1, 1.0]).expect("room");
+        make_room(&mut fine, 160, 0.025, [0.1, 1.0], FARTHEST).expect("room");
         assert_eq!(fine[0].room, [4.5, 4.5]);
     }
 
     #[test]
     fn gaits_without_room_are_rejected() {
         let refused = |swings: &[Swing], bounds| {
-            make_room(&mut swings.to_vec(), 80, 0.05, bounds).expect_err("a refusal")
+            make_room(&mut swings.to_vec(), 80, 0.05, bounds, FARTHEST).expect_err("a refusal")
         };
         assert!(refused(&walk(), [0.9, 1.0]).contains("5 phases of at least 0.9 s"));
         assert!(refused(&walk(), [0.3, 1.0]).contains("the swing of 0.250 s"));

@@ -13,7 +13,7 @@ pub fn try_ground(text: &str, folder: &Path) -> warpgait::Result<Ground> {
         "[start]\nposition = [0, 0]\n[goal]\nposition = [0, 0]\n[terrain]\nkind = \"heightmap\"\n{text}\n"
     );
     let loaded = scenario::load_text("s.toml", &text, folder, &[])?;
-    build(&loaded.scenario, folder).map_err(|e| loaded.locate(e))
+    build(&loaded.scenario, &loaded.robot, folder).map_err(|e| loaded.locate(e))
 }
 
 pub fn ground(text: &str, folder: &Path) -> Ground {

@@ -139,7 +139,7 @@ fn formula() {
                 "terrain.spacing=0.5".into(),
             ];
             if let Ok(loaded) = scenario::load_text("s.toml", seeds::GROUND, folder, &overrides) {
-                let _ = terrain::build(&loaded.scenario, folder);
+                let _ = terrain::build(&loaded.scenario, &loaded.robot, folder);
             }
         },
     );
@@ -165,7 +165,7 @@ fn heights() {
             ];
             let loaded =
                 scenario::load_text("s.toml", seeds::GROUND, folder, &overrides.map(String::from)).unwrap();
-            let _ = terrain::build(&loaded.scenario, folder);
+            let _ = terrain::build(&loaded.scenario, &loaded.robot, folder);
         },
     );
 }

@@ -26,7 +26,7 @@ pub fn terrain(
     overrides: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Terrain> {
     let loaded = load(scenario, overrides)?;
-    let ground = py.detach(|| warpgait::terrain::build(&loaded.scenario, &loaded.base_dir));
+    let ground = py.detach(|| warpgait::terrain::build(&loaded.scenario, &loaded.robot, &loaded.base_dir));
     Ok(Terrain(Arc::new(ground.map_err(|e| exception(loaded.locate(e)))?.field)))
 }
 

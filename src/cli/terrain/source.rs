@@ -128,7 +128,7 @@ impl SourceArguments {
 
 fn read(loaded: LoadedScenario, output: Option<&Path>, has_ends: bool) -> Result<Read> {
     ensure_outputs(output.as_slice(), &loaded.files())?;
-    let built = terrain::build_with_source(&loaded.scenario, &loaded.base_dir);
+    let built = terrain::build_with_source(&loaded.scenario, &loaded.robot, &loaded.base_dir);
     let (ground, heightmap) = built.map_err(|e| loaded.locate(e))?;
     ensure_no_inputs(output.as_slice(), &loaded.paths(&ground.inputs))?;
     Ok(Read { loaded, ground, heightmap, has_ends })
