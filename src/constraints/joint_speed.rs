@@ -25,6 +25,9 @@ use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
 
+/// Name of the block.
+pub const JOINT_SPEED: &str = "joint speed";
+
 /// Speeds of swinging legs.
 #[derive(Clone, Debug)]
 pub struct JointSpeed {
@@ -89,7 +92,7 @@ impl Half {
 
 impl Constraint for JointSpeed {
     fn name(&self) -> &'static str {
-        "joint speed"
+        JOINT_SPEED
     }
 
     fn rows(&self) -> usize {

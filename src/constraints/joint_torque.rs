@@ -25,6 +25,9 @@ use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::rotation::cross_matrix;
 
+/// Name of the block.
+pub const JOINT_TORQUE: &str = "joint torque";
+
 /// Torques of standing legs.
 #[derive(Clone, Debug)]
 pub struct JointTorque {
@@ -91,7 +94,7 @@ fn tangents<'a>(
 
 impl Constraint for JointTorque {
     fn name(&self) -> &'static str {
-        "joint torque"
+        JOINT_TORQUE
     }
 
     fn rows(&self) -> usize {

@@ -20,6 +20,7 @@
 //! | [`mod@guess`], `follow` | where a solve starts; where the scenario gives a motion to start from |
 //! | `task` | what is to be planned, as a model and as a program |
 //! | [`mod@solve`] | the sequence of stages, and one stage |
+//! | `continuation` | when the plain solve fails: the terrain grows out of the plane |
 //! | `reassign` | when that fails over patches: other patches, or other numbers of steps |
 //! | `elastic`, `why` | when no motion is found: which limits would have to give |
 //! | `friction_margin` | the same: what a smaller margin of friction would do |
@@ -34,6 +35,7 @@
 
 mod base_path;
 mod bounds;
+mod continuation;
 mod cyclic;
 pub mod derivatives;
 mod elastic;

@@ -4,14 +4,19 @@
 //! the border of their patch. Then gaits with other numbers of steps, the better ones first.
 
 use super::motion::{Motion, Trouble};
+use super::problem::GaitProblem;
 use super::steps::Steps;
 use super::task::Task;
+use crate::constraints::foothold_patch::FOOTHOLD_PATCH;
+use crate::ipopt::Multipliers;
 use crate::trajectory::Layout;
 
 /// Other steps are tried this often, at most.
 const TRIES: usize = 3;
 /// Stances that are moved at once, at most.
 const MOST_MOVED: usize = 4;
+/// Multipliers of a patch's sides from this on count as large, cost a meter.
+const LARGE_MULTIPLIER: f64 = 1.0;
 
 /// Other steps.
 pub struct Reassignment {
@@ -21,6 +26,23 @@ pub struct Reassignment {
     pub words: String,
     /// Whether feet step when they did before, so that a motion can go on from the one before.
     pub goes_on: bool,
+}
+
+/// Footholds on the border of their patch that would rather be beyond it, the most urgent first.
+pub fn pressed_footholds(problem: &GaitProblem, multipliers: &Multipliers) -> Vec<Trouble> {
+    let model = &problem.model;
+    let Some((block, first)) = problem.blocks().find(|(block, _)| block.name() == FOOTHOLD_PATCH) else {
+        return Vec::new();
+    };
+    let mut pressed: Vec<(f64, Trouble)> = (0..block.rows())
+        .filter_map(|row| {
+            let (place, multiplier) = (block.place(row), multipliers.constraint.get(first + row)?.abs());
+            let trouble = Trouble { foot: place.foot?, time: place.sample * model.layout.time_step };
+            (multiplier > LARGE_MULTIPLIER).then_some((multiplier, trouble))
+        })
+        .collect();
+    pressed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    pressed.into_iter().map(|(_, trouble)| trouble).collect()
 }
 
 /// What is worth a try after a motion, and where something is wrong with it.

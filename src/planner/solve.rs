@@ -4,35 +4,35 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::continuation;
 use super::guess;
 use super::iterate::Iterate;
 use super::leg_update::{LEVER, LegUpdate};
 use super::legs::{self, BodyMotion, FINE};
-use super::motion::{Motion, Seconds, Trouble};
+use super::motion::{Motion, Seconds};
 use super::options;
 use super::problem::{Choice, GaitProblem};
+use super::reassign::pressed_footholds;
 use super::stage::Stage;
 use super::stopping::StoppingRule;
 use super::task::Task;
 use super::violation;
-use crate::constraints::foothold_patch::FOOTHOLD_PATCH;
+use crate::constraints::joint_speed::JOINT_SPEED;
+use crate::constraints::joint_torque::JOINT_TORQUE;
+use crate::constraints::margins;
 use crate::heightfield::Heightfield;
-use crate::ipopt::{self, IterationRecord, LinearSolver, Multipliers, Status};
+use crate::ipopt::{self, IterationRecord, LinearSolver, Multipliers, NlpProblem, Status};
 use crate::nlp::{LegTerms, Model};
-use crate::scenario::{Continuation, ContinuationMode, Effort, Formulation, GivenMotion, Hessian};
-use crate::terrain::Surfaces;
-use crate::trajectory::Spaces;
+use crate::scenario::{Effort, Formulation, GivenMotion, Hessian};
 use crate::warp::WarpMap;
 use crate::{Error, Result};
 
-/// Steps of a continuation with `solver.continuation = "auto"`.
-const CONTINUATION_STEPS: u32 = 3;
-/// Ground whose heights differ by less than this is level, m.
-const LEVEL: f64 = 1e-6;
 /// Fraction of the iterations that the plain solve may take when a continuation may follow.
 const PLAIN_FRACTION: f64 = 0.5;
-/// Multipliers of a patch's sides from this on count as large, cost a meter.
-const LARGE_MULTIPLIER: f64 = 1.0;
+/// Fraction of these iterations that a solve at once may take, when another one may follow that leaves the joints to the end.
+const AT_ONCE_FRACTION: f64 = 0.6;
+/// By how much the joints' rows may be violated at a guess that everything is solved from at once: joints that are twice as fast as allowed.
+const HURRIED: f64 = 2.0 - margins::JOINT_SPEED;
 /// Solves with another estimate of what the legs' mass adds, at most.
 const LEG_ROUNDS: usize = 6;
 
@@ -61,28 +61,22 @@ pub trait Host {
     fn build_map(&mut self, ground: &Heightfield) -> Result<Option<WarpMap>>;
 }
 
-/// Plans a motion, without looking for a reason if none is found: the plain solve first. If it finds no feasible point and the scenario allows it, a continuation follows, in which
-/// the terrain grows out of the plane in steps, each solved from the one before; over ground with edges, a second solve that leaves
-/// the joints to the end. A motion that the scenario gives is solved from at once; if that fails, what follows forgets it.
+/// Plans a motion, without looking for a reason if none is found: the plain solve first. If it finds no feasible point and the scenario allows
+/// it, a continuation follows, in which the terrain grows out of the plane in steps, each solved from the one before; over ground with edges,
+/// a second solve that leaves the joints to the end. A motion that the scenario gives is solved from at once; if that fails, what follows
+/// forgets it.
 ///
 /// # Errors
 /// For a start from which the feet cannot reach the ground. That no motion is found is not an error: see [`Motion::solved`].
 pub fn attempt(task: &Task, host: &mut dyn Host) -> Result<Motion> {
     let solver = &task.scenario.solver;
-    let steps = match solver.continuation {
-        _ if is_level(&task.surfaces.posture) => 0,
-        // Patches of a lower ground are not those of the whole one, nor is a given start on it.
-        _ if task.surfaces.have_edges() || task.scenario.start.state.is_some() => 0,
-        Continuation::Mode(ContinuationMode::Off) => 0,
-        Continuation::Mode(ContinuationMode::Auto) => CONTINUATION_STEPS,
-        Continuation::Steps(n) => n,
-    };
+    let steps = continuation::steps(task);
     let over_edges = task.surfaces.have_edges();
     let is_given = task.guess.is_some();
     let fraction = if steps == 0 && !over_edges && !is_given { 1.0 } else { PLAIN_FRACTION };
     let budget = (solver.max_iterations as f64 * fraction) as usize;
     let mut solve = Solve::new(task, host);
-    let first = if over_edges || is_given { solve.at_once(budget)? } else { solve.joints_last(budget)? };
+    let first = if over_edges || is_given { solve.at_once(budget)? } else { solve.plain(budget)? };
     let first = solve.with_leg_mass(first)?;
     if first.feasible || first.interrupted {
         return Ok(solve.finish(first));
@@ -129,15 +123,9 @@ pub fn attempt_again(task: &Task, host: &mut dyn Host, before: &Motion) -> Resul
     Ok(solve.finish(end))
 }
 
-/// Whether nothing could grow in a continuation.
-fn is_level(ground: &Heightfield) -> bool {
-    let heights = ground.samples();
-    heights.iter().all(|h| (h - heights[0]).abs() < LEVEL)
-}
-
 /// Where a stage starts.
 #[derive(Clone, Debug, PartialEq)]
-enum Start {
+pub(super) enum Start {
     /// At the guess.
     Guess,
     /// At a point that obeys all constraints, or did before some were added or the terrain grew.
@@ -147,30 +135,30 @@ enum Start {
 }
 
 /// How a stage ended.
-struct StageEnd {
-    stage: Stage,
-    problem: GaitProblem,
-    x: Vec<f64>,
+pub(super) struct StageEnd {
+    pub(super) stage: Stage,
+    pub(super) problem: GaitProblem,
+    pub(super) x: Vec<f64>,
     /// At x, and the barrier parameter μ there.
     multipliers: Multipliers,
     mu: f64,
-    feasible: bool,
-    interrupted: bool,
-    status: String,
+    pub(super) feasible: bool,
+    pub(super) interrupted: bool,
+    pub(super) status: String,
 }
 
 /// What all stages of a solve have in common.
-struct Solve<'a> {
-    task: &'a Task<'a>,
+pub(super) struct Solve<'a> {
+    pub(super) task: &'a Task<'a>,
     /// The motion to start from; none any more once a solve from it has failed.
     given: Option<&'a GivenMotion>,
-    host: &'a mut dyn Host,
+    pub(super) host: &'a mut dyn Host,
     start: Instant,
     history: Vec<IterationRecord>,
-    iterations: usize,
+    pub(super) iterations: usize,
     /// The user asked to stop between stages.
-    interrupted: bool,
-    linear_solver: LinearSolver,
+    pub(super) interrupted: bool,
+    pub(super) linear_solver: LinearSolver,
     seconds: Seconds,
 }
 
@@ -189,40 +177,60 @@ impl<'a> Solve<'a> {
         }
     }
 
-    fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
+    pub(super) fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
         let start = Instant::now();
         let x = guess::guess(self.task.scenario, model, self.given)?;
         self.seconds.guess += start.elapsed().as_secs_f64();
         Ok(x)
     }
 
-    /// Solves from the guess, until there are `budget` iterations in all.
+    /// Solves from the guess, until there are `budget` iterations in all: everything at once, unless joints are far too fast there, or that
+    /// fails.
     ///
-    /// Over ground with edges the guess is good, because the footholds and the timing of the base were chosen; a feasible point
-    /// without joints and costs would be a worse start (docs/results.md). So it is with a motion that is given.
-    fn at_once(&mut self, budget: usize) -> Result<StageEnd> {
-        let mut model = self.task.model()?;
-        let x = self.guess(&model)?;
-        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
-        let start = if self.given.is_some() { Start::Feasible } else { Start::Guess };
-        let left = budget.saturating_sub(self.iterations);
-        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
+    /// A feasible point without joints and costs is a wild motion, from which it takes a quarter more iterations (docs/results.md).
+    fn plain(&mut self, budget: usize) -> Result<StageEnd> {
+        let mut whole = self.whole()?;
+        if !is_hurried(&mut whole) {
+            let end =
+                self.run(whole, Stage::Whole, Start::Guess, (budget as f64 * AT_ONCE_FRACTION) as usize)?;
+            if end.feasible || end.interrupted || !has_joints(&end.problem.model) {
+                return Ok(end);
+            }
+        }
+        self.joints_last(budget)
     }
 
     /// Solves from the guess, until there are `budget` iterations in all.
     ///
-    /// Where legs are described, the first stage finds a feasible point without their joints, whose speeds and torques are
+    /// Over ground with edges the guess is good, because the footholds and the timing of the base were chosen. So is a motion that is given.
+    fn at_once(&mut self, budget: usize) -> Result<StageEnd> {
+        let start = if self.given.is_some() { Start::Feasible } else { Start::Guess };
+        let whole = self.whole()?;
+        self.run(whole, Stage::Whole, start, budget.saturating_sub(self.iterations))
+    }
+
+    /// The whole problem, to be started from the guess.
+    fn whole(&mut self) -> Result<GaitProblem> {
+        let mut model = self.task.model()?;
+        let x = self.guess(&model)?;
+        model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
+        Ok(self.problem(Stage::Whole, model, x))
+    }
+
+    /// Solves from the guess, until there are `budget` iterations in all.
+    ///
+    /// Where legs are described, the first stage finds a feasible point without their joints, whose speeds and torques may be
     /// arbitrary at the guess. Out of the pit this takes a third of the iterations of solving everything at once, and converges
     /// where that does not (docs/results.md).
     fn joints_last(&mut self, budget: usize) -> Result<StageEnd> {
         let mut model = self.task.model()?;
         let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
         model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
-        if model.legs.iter().any(Option::is_some) {
+        if has_joints(&model) {
             let mut rough = model.clone();
             rough.legs.fill(None);
             let left = budget.saturating_sub(self.iterations);
-            let rough = self.stage(Stage::WithoutJoints, rough, x, start, Effort::Feasible, left)?;
+            let rough = self.stage(Stage::WithoutJoints, rough, x, start, left)?;
             if !rough.feasible || rough.interrupted {
                 return Ok(rough);
             }
@@ -230,63 +238,7 @@ impl<'a> Solve<'a> {
             model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
         }
         let left = budget.saturating_sub(self.iterations);
-        self.stage(Stage::Whole, model, x, start, self.task.scenario.solver.effort, left)
-    }
-
-    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the
-    /// costs. None when no iterations are left, or the user asked to stop, before the first of them.
-    fn continuation(&mut self, steps: u32) -> Result<Option<StageEnd>> {
-        let scenario = self.task.scenario;
-        let mut last: Option<StageEnd> = None;
-        let mut from: Option<Vec<f64>> = None;
-        for step in 1..=steps {
-            let left = scenario.solver.max_iterations.saturating_sub(self.iterations);
-            if left == 0 || last.as_ref().is_some_and(|end| end.interrupted) {
-                break;
-            }
-            let stage = Stage::Continuation { step, steps };
-            let Some(mut model) = self.scaled_model(stage)? else {
-                self.interrupted = true;
-                break;
-            };
-            let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
-            if let Some(from) = &from {
-                // The pinned start is where this terrain has it; all else continues from the last step.
-                x[6..].copy_from_slice(&from[6..]);
-                start = Start::Feasible;
-            }
-            let effort = if stage.is_whole() { scenario.solver.effort } else { Effort::Feasible };
-            model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
-            let mut end = self.stage(stage, model, x, start, effort, left)?;
-            if !end.feasible && !stage.is_whole() {
-                let percent = 100.0 * stage.height_fraction();
-                end.status = format!("{} with the terrain at {percent:.0} % of its height", end.status);
-            }
-            from = Some(end.x.clone());
-            last = Some(end);
-        }
-        Ok(last)
-    }
-
-    /// The model of a stage of a continuation; none when the user asked to stop while its map was built.
-    fn scaled_model(&mut self, stage: Stage) -> Result<Option<Model>> {
-        if stage.is_whole() {
-            return self.task.model().map(Some);
-        }
-        let Task { scenario, robot, steps, surfaces, .. } = *self.task;
-        let ground = Arc::new(scaled(&surfaces.posture, stage.height_fraction())?);
-        let map = match scenario.formulation() {
-            Formulation::Direct => None,
-            Formulation::Warped | Formulation::Hybrid => match self.host.build_map(&ground)? {
-                Some(map) => Some(Arc::new(map)),
-                None => return Ok(None),
-            },
-        };
-        let spaces = Spaces::of(scenario.formulation(), map)?;
-        let kept = surfaces.clone();
-        let lower = Surfaces { keep_out: kept.keep_out, bends: kept.bends, ..Surfaces::one(ground) };
-        let model = Model::new(scenario, robot, &steps.gait, lower, spaces);
-        self.task.completed(model).map(Some)
+        self.stage(Stage::Whole, model, x, start, left)
     }
 
     /// Solves again with what the legs' mass adds to the laws along the last motion, until that no longer changes.
@@ -313,14 +265,7 @@ impl<'a> Solve<'a> {
             model.leg_terms = terms;
             let start = Start::Warm(end.multipliers, end.mu);
             let status = end.status;
-            end = self.stage(
-                Stage::LegMass { round },
-                model,
-                end.x,
-                start,
-                self.task.scenario.solver.effort,
-                left,
-            )?;
+            end = self.stage(Stage::LegMass { round }, model, end.x, start, left)?;
             if end.feasible && !end.interrupted {
                 // It ends at the first feasible point, because it starts at the solution of nearly the same problem.
                 end.status = status;
@@ -330,7 +275,7 @@ impl<'a> Solve<'a> {
     }
 
     /// What the legs' mass adds along the motion x; none for massless legs.
-    fn leg_terms(&mut self, model: &Model, x: &[f64]) -> Option<LegTerms> {
+    pub(super) fn leg_terms(&mut self, model: &Model, x: &[f64]) -> Option<LegTerms> {
         let start = Instant::now();
         let terms = legs::terms(model, x, self.task.scenario.physics.law);
         self.seconds.evaluation += start.elapsed().as_secs_f64();
@@ -338,26 +283,37 @@ impl<'a> Solve<'a> {
     }
 
     /// Solves from x with at most `budget` iterations.
-    fn stage(
+    pub(super) fn stage(
         &mut self,
         stage: Stage,
         model: Model,
         x: Vec<f64>,
         start: Start,
-        effort: Effort,
         budget: usize,
     ) -> Result<StageEnd> {
+        let problem = self.problem(stage, model, x);
+        self.run(problem, stage, start, budget)
+    }
+
+    /// What a stage demands of its end.
+    fn effort(&self, stage: Stage) -> Effort {
+        if stage.is_whole() { self.task.scenario.solver.effort } else { Effort::Feasible }
+    }
+
+    /// Whether a stage has costs, and where its second derivatives come from.
+    fn kind(&self, stage: Stage) -> (bool, Hessian) {
         let scenario = self.task.scenario;
-        let tolerance = scenario.solver.tolerance;
-        let with_costs = effort != Effort::Feasible && scenario.motion.smoothness != [0.0, 0.0];
-        let hessian = scenario.solver.hessian.unwrap_or(if with_costs {
-            Hessian::Exact
-        } else {
-            Hessian::LimitedMemory
-        });
+        let with_costs = self.effort(stage) != Effort::Feasible && scenario.motion.smoothness != [0.0, 0.0];
+        let usual = if with_costs { Hessian::Exact } else { Hessian::LimitedMemory };
+        (with_costs, scenario.solver.hessian.unwrap_or(usual))
+    }
+
+    /// The problem of a stage, to be started from x.
+    fn problem(&self, stage: Stage, model: Model, x: Vec<f64>) -> GaitProblem {
+        let scenario = self.task.scenario;
+        let (with_costs, hessian) = self.kind(stage);
         let exact = hessian == Hessian::Exact;
-        let choice = Choice { with_costs, exact_hessian: exact };
-        let mut problem = GaitProblem::new(scenario, model, x, choice);
+        let mut problem = GaitProblem::new(scenario, model, x, Choice { with_costs, exact_hessian: exact });
         // A round is the same problem again; an approximated Hessian takes other terms for curvature.
         if exact
             && stage.is_whole()
@@ -366,6 +322,20 @@ impl<'a> Solve<'a> {
         {
             problem.leg_update = Some(LegUpdate::new(scenario.physics.law));
         }
+        problem
+    }
+
+    /// Solves the problem of a stage with at most `budget` iterations.
+    fn run(
+        &mut self,
+        mut problem: GaitProblem,
+        stage: Stage,
+        start: Start,
+        budget: usize,
+    ) -> Result<StageEnd> {
+        let scenario = self.task.scenario;
+        let tolerance = scenario.solver.tolerance;
+        let (with_costs, hessian) = self.kind(stage);
         let centered =
             (&start, hessian, scenario.formulation()) == (&Start::Guess, Hessian::Exact, Formulation::Warped);
         let mut options = options::of(&scenario.solver, hessian, centered, budget);
@@ -374,7 +344,8 @@ impl<'a> Solve<'a> {
             options = options::warm(options, mu);
         }
 
-        let rule_effort = if matches!(stage, Stage::LegMass { .. }) { Effort::Feasible } else { effort };
+        let is_round = matches!(stage, Stage::LegMass { .. });
+        let rule_effort = if is_round { Effort::Feasible } else { self.effort(stage) };
         let mut rule =
             StoppingRule::new(rule_effort, with_costs, tolerance).telling(&problem, problem.settled.clone());
         let mut stopped = false;
@@ -462,21 +433,18 @@ impl<'a> Solve<'a> {
     }
 }
 
-/// Footholds on the border of their patch that would rather be beyond it, the most urgent first.
-fn pressed_footholds(problem: &GaitProblem, multipliers: &Multipliers) -> Vec<Trouble> {
-    let model = &problem.model;
-    let Some((block, first)) = problem.blocks().find(|(block, _)| block.name() == FOOTHOLD_PATCH) else {
-        return Vec::new();
-    };
-    let mut pressed: Vec<(f64, Trouble)> = (0..block.rows())
-        .filter_map(|row| {
-            let (place, multiplier) = (block.place(row), multipliers.constraint.get(first + row)?.abs());
-            let trouble = Trouble { foot: place.foot?, time: place.sample * model.layout.time_step };
-            (multiplier > LARGE_MULTIPLIER).then_some((multiplier, trouble))
-        })
-        .collect();
-    pressed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    pressed.into_iter().map(|(_, trouble)| trouble).collect()
+/// Whether the robot's file describes a leg.
+fn has_joints(model: &Model) -> bool {
+    model.legs.iter().any(Option::is_some)
+}
+
+/// Whether joints are far too fast or too weak at the point that a problem is started from.
+fn is_hurried(problem: &mut GaitProblem) -> bool {
+    let mut x = vec![0.0; problem.num_variables()];
+    problem.initial_point(&mut x);
+    let rows = [JOINT_SPEED, JOINT_TORQUE];
+    let violations = violation::table(problem, &x);
+    violations.iter().any(|block| rows.contains(&block.block.as_str()) && block.largest > HURRIED)
 }
 
 /// How a stage ended, in words.
@@ -490,11 +458,4 @@ fn status(status: Status, feasible: bool, satisfied: bool, with_costs: bool) -> 
         status if feasible => format!("feasible ({status})"),
         status => status.to_string(),
     }
-}
-
-/// The ground with all heights times `fraction`.
-fn scaled(ground: &Heightfield, fraction: f64) -> Result<Heightfield> {
-    let heights: Vec<f64> = ground.samples().iter().map(|h| h * fraction).collect();
-    let grid = ground.grid();
-    Heightfield::interpolate(grid.origin, grid.spacing, grid.columns, grid.rows, &heights)
 }
