@@ -174,8 +174,15 @@ pub fn run(
     let _ = observer(&Event::Step(Step::Solve));
     let provenance = Provenance { loaded, ground: &prepared.ground, map_seconds };
     let mut host = Planning { spec: &scenario.map, observer };
-    let judged = again::plan_motion(&task, &mut host, &provenance).map_err(|e| loaded.locate(e))?;
-    let Judged { motion, plan, check } = judged;
+    let judged = match loaded.with_massless_legs()? {
+        None => again::plan_motion(&task, &mut host, &provenance),
+        Some(lighter) => {
+            let massless = Task { scenario: &lighter.scenario, ..task };
+            let of_massless = Provenance { loaded: &lighter, ..provenance };
+            again::plan_flight((&task, &provenance), (&massless, &of_massless), &mut host)
+        }
+    };
+    let Judged { motion, plan, check } = judged.map_err(|e| loaded.locate(e))?;
     Ok(Some(Planned { prepared, map, plan, motion, check, derivatives }))
 }
 

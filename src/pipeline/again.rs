@@ -19,6 +19,9 @@ const MOST_LENGTH: f64 = 0.02;
 /// … or this fraction of a limit.
 const MOST_FRACTION: f64 = 0.15;
 
+/// Iterations for a motion with flight whose legs have mass, at most: those that are found take 13 to 36.
+const MOST_IN_FLIGHT: usize = 60;
+
 /// A host of solves that passes on what happens.
 pub(super) trait Teller: Host {
     /// Reports what asks for no answer: a request to stop takes effect at the next iteration.
@@ -117,6 +120,30 @@ pub(super) fn plan_motion(task: &Task, host: &mut dyn Teller, provenance: &Prove
     }
     planner::explain(task, host, &mut first.motion)?;
     Judged::new(first.motion, provenance, host)
+}
+
+/// Plans a motion with flight, in which nothing but the legs' own mass holds the trunk against the legs: once with massive legs, and if no motion
+/// is found that way, with massless ones.
+///
+/// # Errors
+/// Those of [`plan_motion`].
+pub(super) fn plan_flight(
+    (massive, provenance): (&Task, &Provenance),
+    (massless, lighter): (&Task, &Provenance),
+    host: &mut dyn Teller,
+) -> Result<Judged> {
+    let mut scenario = massive.scenario.clone();
+    scenario.solver.max_iterations = scenario.solver.max_iterations.min(MOST_IN_FLIGHT);
+    let task = Task { scenario: &scenario, ..*massive };
+    let first = Judged::new(planner::attempt(&task, host)?, provenance, host)?;
+    if first.is_done() {
+        return Ok(first);
+    }
+    host.say(&Event::Note(
+        "no motion is found whose legs have mass; planning with massless legs (physics.legs sets it)",
+    ));
+    host.say(&Event::Step(Step::Solve));
+    plan_motion(massless, host, lighter)
 }
 
 /// Tries what may do in turn, until something does; the last that was tried, if there is anything to try.

@@ -121,13 +121,11 @@ impl Scenario {
     }
 
     /// What the legs weigh, for a robot whose links have masses. Over ground with edges, where swings are high and quick, the default is
-    /// massless: massive legs cost iterations and reach there (docs/results.md). So it is with flight, in which nothing holds the trunk
-    /// against the legs, and what they add often does not converge, and where the motion starts or ends moving or with feet in the air.
+    /// massless: massive legs cost iterations and reach there (docs/results.md). So it is where the motion starts or ends moving or with
+    /// feet in the air.
     pub fn legs(&self) -> Legs {
         self.physics.legs.unwrap_or(match self.footholds() {
-            Footholds::Anywhere if !self.gait.flies() && !self.moves_at_ends() && !self.is_in_air() => {
-                Legs::Massive
-            }
+            Footholds::Anywhere if !self.moves_at_ends() && !self.is_in_air() => Legs::Massive,
             _ => Legs::Massless,
         })
     }

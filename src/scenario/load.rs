@@ -8,6 +8,7 @@ use super::continued;
 use super::format::Scenario;
 use super::guess::{GivenMotion, GuessSpec};
 use super::mask;
+use super::motion::Legs;
 use super::way;
 use crate::digest::sha256_hex;
 use crate::files;
@@ -73,6 +74,24 @@ impl LoadedScenario {
     /// Where a value was set, for messages about another one that contradicts it.
     pub fn place(&self, key: &str) -> String {
         self.document.place(key)
+    }
+
+    /// The same with massless legs, for a motion with flight that is not found with massive ones; none where the scenario says which, or
+    /// they are massless anyway.
+    ///
+    /// # Errors
+    /// None for a scenario that was loaded.
+    pub fn with_massless_legs(&self) -> Result<Option<Self>> {
+        let scenario = &self.scenario;
+        let massive = scenario.legs() == Legs::Massive && self.robot.body().is_some();
+        if !massive || scenario.physics.legs.is_some() || !scenario.gait.flies() {
+            return Ok(None);
+        }
+        let mut other = self.clone();
+        other.document.derive("physics.legs=massless", None)?;
+        other.scenario = read(&other.document)?;
+        other.effective_text = text_of(&other.document)?;
+        Ok(Some(other))
     }
 
     /// Whether the state at the start is where `start.plan` is left.
@@ -164,7 +183,7 @@ fn assemble(
     let guess = given(&document, &scenario, &robot, &base_dir)?;
     let effective_text = match overrides {
         [] if !changed => source_text.clone(),
-        _ => toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))?,
+        _ => text_of(&document)?,
     };
     Ok(LoadedScenario {
         other_files: start_plan.iter().chain(&masks).map(|(name, _)| base_dir.join(name)).collect(),
@@ -186,6 +205,10 @@ fn assemble(
         document,
         file: None,
     })
+}
+
+fn text_of(document: &Document) -> Result<String> {
+    toml::to_string(document.table()).map_err(|e| Error::Internal(format!("scenario: {e}")))
 }
 
 /// The motion that the scenario gives to start from, and its file's name and SHA-256.

@@ -125,8 +125,8 @@ pub enum Legs {
 pub struct PhysicsSpec {
     /// The form of the laws of motion.
     pub law: Law,
-    /// What the legs weigh; by default massive where the robot's file has the masses of their links, feet
-    /// may stand anywhere, and the gait has no flight.
+    /// What the legs weigh; by default massive where the robot's file has the masses of their links and feet
+    /// may stand anywhere. With flight, by default, massless if no motion is found with massive ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub legs: Option<Legs>,
 }
