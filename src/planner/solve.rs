@@ -125,7 +125,7 @@ pub fn attempt_again(task: &Task, host: &mut dyn Host, before: &Motion) -> Resul
 
 /// Where a stage starts.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Start {
+enum Start {
     /// At the guess.
     Guess,
     /// At a point that obeys all constraints, or did before some were added or the terrain grew.
@@ -135,30 +135,30 @@ pub(super) enum Start {
 }
 
 /// How a stage ended.
-pub(super) struct StageEnd {
-    pub(super) stage: Stage,
-    pub(super) problem: GaitProblem,
-    pub(super) x: Vec<f64>,
+struct StageEnd {
+    stage: Stage,
+    problem: GaitProblem,
+    x: Vec<f64>,
     /// At x, and the barrier parameter μ there.
     multipliers: Multipliers,
     mu: f64,
-    pub(super) feasible: bool,
-    pub(super) interrupted: bool,
-    pub(super) status: String,
+    feasible: bool,
+    interrupted: bool,
+    status: String,
 }
 
 /// What all stages of a solve have in common.
-pub(super) struct Solve<'a> {
-    pub(super) task: &'a Task<'a>,
+struct Solve<'a> {
+    task: &'a Task<'a>,
     /// The motion to start from; none any more once a solve from it has failed.
     given: Option<&'a GivenMotion>,
-    pub(super) host: &'a mut dyn Host,
+    host: &'a mut dyn Host,
     start: Instant,
     history: Vec<IterationRecord>,
-    pub(super) iterations: usize,
+    iterations: usize,
     /// The user asked to stop between stages.
-    pub(super) interrupted: bool,
-    pub(super) linear_solver: LinearSolver,
+    interrupted: bool,
+    linear_solver: LinearSolver,
     seconds: Seconds,
 }
 
@@ -177,7 +177,7 @@ impl<'a> Solve<'a> {
         }
     }
 
-    pub(super) fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
+    fn guess(&mut self, model: &Model) -> Result<Vec<f64>> {
         let start = Instant::now();
         let x = guess::guess(self.task.scenario, model, self.given)?;
         self.seconds.guess += start.elapsed().as_secs_f64();
@@ -241,6 +241,41 @@ impl<'a> Solve<'a> {
         self.stage(Stage::Whole, model, x, start, left)
     }
 
+    /// Solves with the terrain at 1/n, 2/n, … of its height, each to a feasible point from the last, the whole one with the
+    /// costs. None when no iterations are left, or the user asked to stop, before the first of them.
+    fn continuation(&mut self, steps: u32) -> Result<Option<StageEnd>> {
+        let scenario = self.task.scenario;
+        let mut last: Option<StageEnd> = None;
+        let mut from: Option<Vec<f64>> = None;
+        for step in 1..=steps {
+            let left = scenario.solver.max_iterations.saturating_sub(self.iterations);
+            if left == 0 || last.as_ref().is_some_and(|end| end.interrupted) {
+                break;
+            }
+            let stage = Stage::Continuation { step, steps };
+            let mut build_map = |ground: &Heightfield| self.host.build_map(ground);
+            let Some(mut model) = continuation::model(self.task, stage, &mut build_map)? else {
+                self.interrupted = true;
+                break;
+            };
+            let (mut x, mut start) = (self.guess(&model)?, Start::Guess);
+            if let Some(from) = &from {
+                // The pinned start is where this terrain has it; all else continues from the last step.
+                x[6..].copy_from_slice(&from[6..]);
+                start = Start::Feasible;
+            }
+            model.leg_terms = self.leg_terms(&model, &x).unwrap_or_default();
+            let mut end = self.stage(stage, model, x, start, left)?;
+            if !end.feasible && !stage.is_whole() {
+                let percent = 100.0 * stage.height_fraction();
+                end.status = format!("{} with the terrain at {percent:.0} % of its height", end.status);
+            }
+            from = Some(end.x.clone());
+            last = Some(end);
+        }
+        Ok(last)
+    }
+
     /// Solves again with what the legs' mass adds to the laws along the last motion, until that no longer changes.
     fn with_leg_mass(&mut self, mut end: StageEnd) -> Result<StageEnd> {
         for round in 1.. {
@@ -275,7 +310,7 @@ impl<'a> Solve<'a> {
     }
 
     /// What the legs' mass adds along the motion x; none for massless legs.
-    pub(super) fn leg_terms(&mut self, model: &Model, x: &[f64]) -> Option<LegTerms> {
+    fn leg_terms(&mut self, model: &Model, x: &[f64]) -> Option<LegTerms> {
         let start = Instant::now();
         let terms = legs::terms(model, x, self.task.scenario.physics.law);
         self.seconds.evaluation += start.elapsed().as_secs_f64();
@@ -283,7 +318,7 @@ impl<'a> Solve<'a> {
     }
 
     /// Solves from x with at most `budget` iterations.
-    pub(super) fn stage(
+    fn stage(
         &mut self,
         stage: Stage,
         model: Model,
