@@ -1,4 +1,4 @@
-"""Robots with legs of four and six joints: imported, planned, checked, replayed and exported."""
+"""Robots with legs of four to seven joints: imported, planned, checked, replayed and exported."""
 
 from __future__ import annotations
 
@@ -32,6 +32,9 @@ SIX = [
     ("0 1 0", "0 0 -0.22", "-1.2 1.4", 0.1, 0.0, 0.0, 40),
     ("1 0 0", "0 0 -0.02", "-0.5 0.5", 0.15, 0.06, 0.012, 40),
 ]
+# Without the roll of the ankle; with another turn of the shank about its own axis.
+FIVE = [*SIX[:4], ("0 1 0", "0 0 -0.22", "-1.2 1.4", 0.2, 0.08, 0.012, 40)]
+SEVEN = [*SIX[:4], ("0 0 1", "0 0 -0.12", "-0.5 0.5", 0.1, 0.0, 0.0, 40), ("0 1 0", "0 0 -0.1", "-1.2 1.4", 0.1, 0.0, 0.0, 40), SIX[5]]
 
 
 def leg(name: str, links: list[tuple[str, str, str, float, float, float, int]]) -> str:
@@ -128,11 +131,12 @@ def test_four_joints_are_planned_checked_replayed_and_exported(four: Path, monke
     assert motion.joint_position.shape[1] == 16
 
 
-def test_six_joints_are_planned_checked_and_replayed(tmp_path: Path) -> None:
-    six = imported(tmp_path, "six", SIX)
-    plan = plan_on(six, Terrain.shape("flat"))
+@pytest.mark.parametrize("links", [FIVE, SIX, SEVEN], ids=["five", "six", "seven"])
+def test_more_joints_are_planned_checked_and_replayed(links: list[tuple[str, str, str, float, float, float, int]], tmp_path: Path) -> None:
+    robot = imported(tmp_path, "robot", links)
+    plan = plan_on(robot, Terrain.shape("flat"))
     assert plan.solved and plan.passed
-    report = plan.validate(Settings(quick=True, model=str(six.with_suffix(".xml"))))
+    report = plan.validate(Settings(quick=True, model=str(robot.with_suffix(".xml"))))
     assert report.verdict in ("pass", "marginal"), report
 
 
