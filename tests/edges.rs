@@ -154,9 +154,9 @@ fn short_treads_get_more_steps() {
     assert!(stairs > flat, "{stairs} steps on the stairs and {flat} on the flat");
 }
 
-/// Nothing in the choice of steps and footholds is of ANYmal's size.
+/// Nothing in the choice of steps and footholds is of ANYmal's size: lengths go by the robot's, and times by its root.
 #[test]
-fn a_robot_of_half_the_size_takes_steps_of_half_the_length() {
+fn a_robot_of_a_quarter_of_the_size_takes_steps_of_a_quarter_of_the_length_in_half_of_the_time() {
     let folder = tempfile::tempdir().unwrap();
     let steps = |ground: &str, size: f64| {
         let lengths = |values: [f64; 3]| values.map(|value| size * value);
@@ -175,8 +175,10 @@ fn a_robot_of_half_the_size_takes_steps_of_half_the_length() {
         std::fs::write(folder.path().join("r.toml"), robot).unwrap();
         let ground = ground.replace('X', &format!("(x/{size})")).replace('Y', &format!("(y/{size})"));
         let text = format!(
-            "formulation = \"direct\"\nhorizon = 10.0\n[robot]\nfile = \"r.toml\"\n[terrain]\nkind = \"formula\"\nexpression = \"{size} * ({ground})\"\n\
+            "formulation = \"direct\"\nhorizon = {:?}\ntime_step = {:?}\n[robot]\nfile = \"r.toml\"\n[terrain]\nkind = \"formula\"\nexpression = \"{size} * ({ground})\"\n\
              spacing = {:?}\nextent = {:?}\n[contact]\nfootholds = \"patches\"\n[start]\nposition = {:?}\n[goal]\nposition = {:?}\n",
+            10.0 * size.sqrt(),
+            0.05 * size.sqrt(),
             0.02 * size,
             [-1.4, 4.4, -1.0, 1.0].map(|value| size * value),
             [-0.4 * size, 0.0],
@@ -190,11 +192,11 @@ fn a_robot_of_half_the_size_takes_steps_of_half_the_length() {
     let stairs = "0.15*max(0, min(5, 1 + floor((X - 0.6)/0.32)))";
     let blocks = "0.03*sign(sin(17*X + 0.5)*sin(15*Y + 2*X))";
     for ground in [stairs, blocks] {
-        let [whole, half] = [1.0, 0.5].map(|size| steps(ground, size));
-        assert!(whole.patches[0].len() > 6 && whole.gait == half.gait, "{ground}");
-        for (whole, half) in whole.patches.iter().flatten().zip(half.patches.iter().flatten()) {
-            for (whole, half) in whole.corners().iter().flatten().zip(half.corners().iter().flatten()) {
-                assert!((0.5 * whole - half).abs() < 1e-9, "{ground}: {whole} and {half}");
+        let [whole, small] = [1.0, 0.25].map(|size| steps(ground, size));
+        assert!(whole.patches[0].len() > 6 && whole.gait == small.gait, "{ground}");
+        for (whole, small) in whole.patches.iter().flatten().zip(small.patches.iter().flatten()) {
+            for (whole, small) in whole.corners().iter().flatten().zip(small.corners().iter().flatten()) {
+                assert!((0.25 * whole - small).abs() < 1e-9, "{ground}: {whole} and {small}");
             }
         }
     }
