@@ -18,7 +18,6 @@ const TIGHTENED: f64 = 1.5;
 const MOST_LENGTH: f64 = 0.02;
 /// … or this fraction of a limit.
 const MOST_FRACTION: f64 = 0.15;
-
 /// Iterations for a motion with flight whose legs have mass, at most: those that are found take 13 to 36.
 const MOST_IN_FLIGHT: usize = 60;
 
@@ -143,7 +142,11 @@ pub(super) fn plan_flight(
         "no motion is found whose legs have mass; planning with massless legs (physics.legs sets it)",
     ));
     host.say(&Event::Step(Step::Solve));
-    plan_motion(massless, host, lighter)
+    let mut judged = plan_motion(massless, host, lighter)?;
+    for seconds in [&mut judged.motion.seconds, &mut judged.plan.meta.solver.seconds] {
+        seconds.total += first.motion.seconds.total;
+    }
+    Ok(judged)
 }
 
 /// Tries what may do in turn, until something does; the last that was tried, if there is anything to try.

@@ -190,10 +190,13 @@ impl<'a> Solve<'a> {
     /// A feasible point without joints and costs is a wild motion, from which it takes a quarter more iterations (docs/results.md).
     fn plain(&mut self, budget: usize) -> Result<StageEnd> {
         let mut whole = self.whole()?;
+        if !has_joints(&whole.model) {
+            return self.run(whole, Stage::Whole, Start::Guess, budget);
+        }
         if !is_hurried(&mut whole) {
-            let end =
-                self.run(whole, Stage::Whole, Start::Guess, (budget as f64 * AT_ONCE_FRACTION) as usize)?;
-            if end.feasible || end.interrupted || !has_joints(&end.problem.model) {
+            let most = (budget as f64 * AT_ONCE_FRACTION) as usize;
+            let end = self.run(whole, Stage::Whole, Start::Guess, most)?;
+            if end.feasible || end.interrupted {
                 return Ok(end);
             }
         }
