@@ -138,6 +138,19 @@ fn cells_that_are_too_fine_are_refused_at_once() {
     let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
     let refused = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(())).err().expect("a refusal");
     assert!(refused.to_string().contains("too fine"), "{refused}");
+    // What it asks for is accepted.
+    let message = refused.to_string();
+    let spacing =
+        message.rsplit("cells of ").next().and_then(|rest| rest.split(' ').next()).expect("a spacing");
+    let text =
+        scenario("anymal_c", "hybrid", STEP, 1.0).replace("spacing = 0.02", &format!("spacing = {spacing}"));
+    let loaded = load_text("s.toml", &text, ".".as_ref(), &[]).expect("a scenario");
+    let prepared = Prepared::new(&loaded, &mut |_| ControlFlow::Continue(()));
+    assert!(
+        prepared.is_ok(),
+        "{spacing}: {}",
+        prepared.err().map(|error| error.to_string()).unwrap_or_default()
+    );
 }
 
 #[test]

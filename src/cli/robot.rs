@@ -26,6 +26,18 @@ Examples:
 A scenario names the file: [robot] file = \"go2.toml\". For the replay: warpgait validate P.plan.npz --model go2.xml.
 Import runs the Python package, as `warpgait validate` does.";
 
+const IMPORT: &str = "\
+Options of the Python package, among others:
+  -o DIR/NAME               what the files are called
+  --feet LINK,…             the feet, if the links that reach the ground are others
+  --stance Q,…              the joint angles of a leg at rest, rad
+  --range, --speed-limit, --torque-limit    limits that the file does not have
+  --freeze JOINT,…          joints that are held still
+  --forward AXIS            where the robot looks, if not along x
+  --without-meshes, --mend-inertias         do without meshes that are absent; put impossible inertias right
+
+All of them: warpgait robot import -- --help";
+
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RobotArguments {
@@ -36,6 +48,7 @@ pub(super) struct RobotArguments {
 #[derive(Debug, Subcommand)]
 enum RobotCommand {
     /// Make a robot of a URDF or MJCF: NAME.toml and NAME.xml
+    #[command(after_help = IMPORT)]
     Import(PythonArguments),
     /// Draw a robot and print what it is: mass, size, legs, limits
     Show(ShowArguments),

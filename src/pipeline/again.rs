@@ -138,13 +138,22 @@ pub(super) fn plan_flight(
     if first.is_done() {
         return Ok(first);
     }
+    let mut spent = first.motion.seconds.total;
+    if first.motion.solved
+        && let Some(last) = try_again(&task, &first, host, provenance, &mut Vec::new())?
+    {
+        if last.is_done() {
+            return Ok(last);
+        }
+        spent = last.motion.seconds.total;
+    }
     host.say(&Event::Note(
         "no motion is found whose legs have mass; planning with massless legs (physics.legs sets it)",
     ));
     host.say(&Event::Step(Step::Solve));
     let mut judged = plan_motion(massless, host, lighter)?;
     for seconds in [&mut judged.motion.seconds, &mut judged.plan.meta.solver.seconds] {
-        seconds.total += first.motion.seconds.total;
+        seconds.total += spent;
     }
     Ok(judged)
 }

@@ -163,12 +163,19 @@ fn ensure_coarse(grid: &Grid, reach: f64) -> Result<()> {
     }
     let fine = x.min(y);
     let what = format!(
-        "{} x {} cells of {fine} m are too fine for contact.footholds = \"patches\"; use a part of them (terrain.extent), or cells of {:.3} m",
+        "{} x {} cells of {fine} m are too fine for contact.footholds = \"patches\"; use a part of them (terrain.extent), or the same ground in cells of {} m",
         grid.columns,
         grid.rows,
-        fine * (work / MOST_WORK).powf(0.25)
+        rounded_up(fine * (work / MOST_WORK).powf(0.25))
     );
     Err(crate::Error::key("terrain.spacing", what))
+}
+
+/// With two digits, and not less than the length, m.
+fn rounded_up(length: f64) -> String {
+    let digits = (1.0 - length.log10().floor()).max(0.0);
+    let scale = 10f64.powf(digits);
+    format!("{:.*}", digits as usize, (length * scale).ceil() / scale)
 }
 
 /// The ground on which the robot stands on average: what cannot be stood on is filled by a membrane, then all is smoothed.
