@@ -34,7 +34,12 @@ SIX = [
 ]
 # Without the roll of the ankle; with another turn of the shank about its own axis.
 FIVE = [*SIX[:4], ("0 1 0", "0 0 -0.22", "-1.2 1.4", 0.2, 0.08, 0.012, 40)]
-SEVEN = [*SIX[:4], ("0 0 1", "0 0 -0.12", "-0.5 0.5", 0.1, 0.0, 0.0, 40), ("0 1 0", "0 0 -0.1", "-1.2 1.4", 0.1, 0.0, 0.0, 40), SIX[5]]
+SEVEN = [
+    *SIX[:4],
+    ("0 0 1", "0 0 -0.12", "-0.5 0.5", 0.1, 0.0, 0.0, 40),
+    ("0 1 0", "0 0 -0.1", "-1.2 1.4", 0.1, 0.0, 0.0, 40),
+    SIX[5],
+]
 
 
 def leg(name: str, links: list[tuple[str, str, str, float, float, float, int]]) -> str:
@@ -132,7 +137,9 @@ def test_four_joints_are_planned_checked_replayed_and_exported(four: Path, monke
 
 
 @pytest.mark.parametrize("links", [FIVE, SIX, SEVEN], ids=["five", "six", "seven"])
-def test_more_joints_are_planned_checked_and_replayed(links: list[tuple[str, str, str, float, float, float, int]], tmp_path: Path) -> None:
+def test_more_joints_are_planned_checked_and_replayed(
+    links: list[tuple[str, str, str, float, float, float, int]], tmp_path: Path
+) -> None:
     robot = imported(tmp_path, "robot", links)
     plan = plan_on(robot, Terrain.shape("flat"))
     assert plan.solved and plan.passed
