@@ -425,8 +425,8 @@ class PhysicsSpec(TypedDict, total=False):
     law: Law
     """The form of the laws of motion."""
     legs: Legs
-    """What the legs weigh; by default massive where the robot's file has the masses of their links, feet may stand anywhere, and the
-    gait has no flight."""
+    """What the legs weigh; by default massive where the robot's file has the masses of their links and feet may stand anywhere. With
+    flight, by default, massless if no motion is found with massive ones."""
 
 
 class DiscretizationSpec(TypedDict, total=False):
