@@ -20,6 +20,7 @@ use crate::nlp::{Model, State};
 use crate::trajectory::Instant;
 use crate::trajectory::layout::Phase;
 use crate::trajectory::rotation::cross_matrix;
+use crate::trajectory::switches::ramp;
 use nalgebra::{Matrix3, Vector3};
 
 use super::margins;
@@ -97,8 +98,7 @@ fn around(model: &Model, i: usize, at: Instant, radius: f64) -> Vec<(usize, f64)
         Phase::Stance(j) => vec![(j, radius)],
         Phase::Swing(j) => {
             let swing = &model.layout.feet[i].swings[j].swing;
-            let u = ((at.time() - swing.start) / (swing.end - swing.start)).clamp(0.0, 1.0);
-            let after = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+            let after = ramp((at.time() - swing.start) / (swing.end - swing.start))[0];
             vec![(j, radius * (1.0 - after)), (j + 1, radius * after)]
         }
     }

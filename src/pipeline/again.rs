@@ -18,7 +18,7 @@ const TIGHTENED: f64 = 1.5;
 const MOST_LENGTH: f64 = 0.02;
 /// … or this fraction of a limit.
 const MOST_FRACTION: f64 = 0.15;
-/// Iterations for a motion with flight whose legs have mass, at most: those that are found take 13 to 36.
+/// Iterations for a motion with flight whose legs have mass, at most: those that are found take 10 to 36.
 const MOST_IN_FLIGHT: usize = 60;
 
 /// A host of solves that passes on what happens.
@@ -121,8 +121,8 @@ pub(super) fn plan_motion(task: &Task, host: &mut dyn Teller, provenance: &Prove
     Judged::new(first.motion, provenance, host)
 }
 
-/// Plans a motion with flight, in which nothing but the legs' own mass holds the trunk against the legs: once with massive legs, and if no motion
-/// is found that way, with massless ones.
+/// Plans a motion with flight. In flight nothing holds the trunk against the swinging legs, and what their mass adds may not settle. So this
+/// tries massive legs first, and massless ones if no motion is found.
 ///
 /// # Errors
 /// Those of [`plan_motion`].

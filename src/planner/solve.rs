@@ -31,7 +31,7 @@ use crate::{Error, Result};
 const PLAIN_FRACTION: f64 = 0.5;
 /// Fraction of these iterations that a solve at once may take, when another one may follow that leaves the joints to the end.
 const AT_ONCE_FRACTION: f64 = 0.6;
-/// By how much the joints' rows may be violated at a guess that everything is solved from at once: joints that are twice as fast as allowed.
+/// Largest violation of the joints' rows at a guess from which everything is solved at once: that of a joint at twice its speed limit.
 const HURRIED: f64 = 2.0 - margins::JOINT_SPEED;
 /// Solves with another estimate of what the legs' mass adds, at most.
 const LEG_ROUNDS: usize = 6;
